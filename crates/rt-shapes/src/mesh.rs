@@ -1,0 +1,309 @@
+//! [`TriangleMesh`]: indexed triangles.
+
+use crate::{Meeting, Surface, Surfaced, Triangle, Uv};
+use core::fmt;
+use core::ops::ControlFlow;
+use rt_accel::{Bounded, Geometry, Hit};
+use rt_bounds::Aabb;
+use rt_geom::glam::{DVec2, DVec3, Vec3A};
+use rt_geom::{Ray, Real, gamma};
+
+/// Triangles over shared vertices, in world space, of `f32` or `f64` coordinates.
+///
+/// A mesh of `f32` answers rays of both precisions, one of `f64` answers `f64` rays. Its triangles are never objects: 12 bytes
+/// each beside the vertices. Normals and texture coordinates are stored where there are any.
+///
+/// A triangle with a vertex that is not finite is left out by every structure. One without area stands in the tree and is
+/// never hit; [`TriangleMesh::degenerate`] counts them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TriangleMesh<V: Real = f32> {
+    vertices: Vec<[V; 3]>,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<[f32; 3]>,
+    uvs: Vec<[f32; 2]>,
+}
+
+/// Why arrays are not a mesh.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// A triangle names a vertex that does not exist.
+    IndexOutOfRange {
+        /// The triangle's number.
+        triangle: usize,
+        /// The vertex it names.
+        index: u32,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// More triangles than numbers.
+    TooManyTriangles {
+        /// How many there are.
+        len: usize,
+    },
+    /// Attributes are not one per vertex.
+    AttributeCount {
+        /// Which attribute.
+        name: &'static str,
+        /// How many there are.
+        len: usize,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+}
+
+impl fmt::Display for MeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            MeshError::IndexOutOfRange { triangle, index, vertices } => {
+                write!(f, "triangle {triangle} names vertex {index}, but there are {vertices}")
+            }
+            MeshError::TooManyTriangles { len } => write!(f, "{len} triangles are more than can be numbered"),
+            MeshError::AttributeCount { name, len, vertices } => {
+                write!(f, "{len} {name} for {vertices} vertices")
+            }
+        }
+    }
+}
+
+impl core::error::Error for MeshError {}
+
+impl<V: Real> TriangleMesh<V> {
+    /// A mesh from vertices and the vertex numbers of each triangle's corners.
+    ///
+    /// # Errors
+    ///
+    /// When a triangle names a vertex that is not there, or there are `2^32 - 2` triangles or more.
+    pub fn new(vertices: Vec<[V; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
+        if triangles.len() >= u32::MAX as usize - 1 {
+            return Err(MeshError::TooManyTriangles { len: triangles.len() });
+        }
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&index) = corners.iter().find(|&&i| i as usize >= vertices.len()) {
+                return Err(MeshError::IndexOutOfRange { triangle, index, vertices: vertices.len() });
+            }
+        }
+        Ok(TriangleMesh { vertices, triangles, normals: Vec::new(), uvs: Vec::new() })
+    }
+
+    /// The same mesh with a normal per vertex, of any length, to shade with.
+    ///
+    /// # Errors
+    ///
+    /// When there is not one for each vertex.
+    pub fn with_normals(self, normals: Vec<[f32; 3]>) -> Result<Self, MeshError> {
+        self.per_vertex("normals", normals.len())?;
+        Ok(TriangleMesh { normals, ..self })
+    }
+
+    /// The same mesh with texture coordinates per vertex.
+    ///
+    /// # Errors
+    ///
+    /// When there are not two for each vertex.
+    pub fn with_uvs(self, uvs: Vec<[f32; 2]>) -> Result<Self, MeshError> {
+        self.per_vertex("texture coordinates", uvs.len())?;
+        Ok(TriangleMesh { uvs, ..self })
+    }
+
+    fn per_vertex(&self, name: &'static str, len: usize) -> Result<(), MeshError> {
+        let vertices = self.vertices.len();
+        if len == vertices { Ok(()) } else { Err(MeshError::AttributeCount { name, len, vertices }) }
+    }
+
+    /// The vertices.
+    pub fn vertices(&self) -> &[[V; 3]] {
+        &self.vertices
+    }
+
+    /// The vertices, to be moved; the structure over the mesh must then be refitted.
+    pub fn vertices_mut(&mut self) -> &mut [[V; 3]] {
+        &mut self.vertices
+    }
+
+    /// The vertex numbers of each triangle.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Triangle `prim` by its corners.
+    #[inline(always)]
+    pub fn triangle(&self, prim: u32) -> Triangle {
+        Triangle { corners: self.corners(prim).map(widen) }
+    }
+
+    /// How many triangles have no area: equal or collinear corners, decided in `f64`.
+    pub fn degenerate(&self) -> usize {
+        let flat = |prim: &u32| {
+            let [a, b, c] = self.triangle(*prim).corners;
+            (b - a).cross(c - a) == DVec3::ZERO
+        };
+        (0..self.triangles.len() as u32).filter(flat).count()
+    }
+
+    #[inline(always)]
+    fn corners(&self, prim: u32) -> [[V; 3]; 3] {
+        self.triangles[prim as usize].map(|i| self.vertices[i as usize])
+    }
+
+    /// The interpolated normal, if there is one with a direction.
+    fn shading(&self, prim: u32, weights: [f64; 3]) -> Option<DVec3> {
+        if self.normals.is_empty() {
+            return None;
+        }
+        let [a, b, c] = self.triangles[prim as usize].map(|i| widen(self.normals[i as usize]));
+        (a * weights[0] + b * weights[1] + c * weights[2]).try_normalize()
+    }
+}
+
+#[inline(always)]
+fn widen<V: Real>([x, y, z]: [V; 3]) -> DVec3 {
+    DVec3::new(x.into(), y.into(), z.into())
+}
+
+impl<V: Real> Bounded for TriangleMesh<V> {
+    fn prim_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    #[inline]
+    fn bound(&self, prim: u32) -> Aabb {
+        self.bound_from(prim, DVec3::ZERO)
+    }
+
+    #[inline]
+    fn bound_from(&self, prim: u32, origin: DVec3) -> Aabb {
+        let [a, b, c] = self.triangle(prim).corners;
+        if !(a.is_finite() && b.is_finite() && c.is_finite()) {
+            return Aabb::new(Vec3A::NAN, Vec3A::NAN);
+        }
+        Aabb::from_f64(a.min(b).min(c), a.max(b).max(c), origin)
+    }
+}
+
+impl<R: Real, V: Real + Into<R>> Geometry<R> for TriangleMesh<V> {
+    type At = Uv;
+
+    #[inline(always)]
+    fn intersect(&self, prim: u32, ray: &Ray<R>) -> Option<Hit<Uv, R>> {
+        self.triangle(prim).intersect(ray).map(|meeting| hit(prim, meeting))
+    }
+
+    fn all_hits(
+        &self,
+        prim: u32,
+        ray: &Ray<R>,
+        each: &mut dyn FnMut(Hit<Uv, R>) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        match self.triangle(prim).cross(ray) {
+            Some(meeting) => each(hit(prim, meeting)),
+            None => ControlFlow::Continue(()),
+        }
+    }
+}
+
+#[inline(always)]
+pub(crate) fn hit<R: Real>(prim: u32, Meeting { t, u, v }: Meeting<R>) -> Hit<Uv, R> {
+    Hit { t, at: Uv { prim, u: u as f32, v: v as f32 } }
+}
+
+impl<R: Real, V: Real + Into<R>> Surfaced<R> for TriangleMesh<V> {
+    fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
+        let prim = hit.at.prim;
+        let triangle = self.triangle(prim);
+        // The weights in full precision.
+        let (u, v) = match triangle.intersect(&Ray { t_min: -R::INFINITY, t_max: R::INFINITY, ..*ray }) {
+            Some(meeting) => (meeting.u, meeting.v),
+            None => (hit.at.u as f64, hit.at.v as f64),
+        };
+        let weights = [1.0 - u - v, u, v];
+        let mut surface = triangle.surface(weights);
+        surface.uv = if self.uvs.is_empty() {
+            DVec2::new(u, v)
+        } else {
+            let [a, b, c] =
+                self.triangles[prim as usize].map(|i| DVec2::from(self.uvs[i as usize].map(f64::from)));
+            a * weights[0] + b * weights[1] + c * weights[2]
+        };
+        if let Some(shading) = self.shading(prim, weights) {
+            // The vertex normals decide which side is outside.
+            if shading.dot(surface.normal) < 0.0 {
+                surface.normal = -surface.normal;
+            }
+            surface.shading = shading;
+        }
+        surface
+    }
+}
+
+impl Triangle {
+    /// The surface at the point with these weights of the three corners, which add to 1.
+    ///
+    /// Error of the point: 7 roundings of each term (Pharr et al. 2023, section 6.8.4).
+    pub fn surface(&self, [w0, w1, w2]: [f64; 3]) -> Surface {
+        let [a, b, c] = self.corners;
+        let point = a * w0 + b * w1 + c * w2;
+        let error = (a.abs() * w0.abs() + b.abs() * w1.abs() + c.abs() * w2.abs()) * gamma(7);
+        let normal = (b - a).cross(c - a);
+        // Scaled first where the square of a component would leave the range.
+        let normal = (normal / normal.abs().max_element()).normalize_or_zero();
+        Surface { point, error, normal, shading: normal, uv: DVec2::new(w1, w2) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_indices_are_named() {
+        let error = TriangleMesh::new(vec![[0.0f32; 3]; 3], vec![[0, 1, 2], [0, 3, 1]]).unwrap_err();
+        assert_eq!(error, MeshError::IndexOutOfRange { triangle: 1, index: 3, vertices: 3 });
+        assert_eq!(error.to_string(), "triangle 1 names vertex 3, but there are 3");
+        let mesh = TriangleMesh::new(vec![[0.0f32; 3]; 3], vec![[0, 1, 2]]).unwrap();
+        assert_eq!(mesh.degenerate(), 1);
+        assert!(mesh.with_normals(vec![[0.0; 3]; 2]).is_err());
+    }
+
+    #[test]
+    fn a_vertex_that_is_not_finite_spoils_its_triangle_only() {
+        let mesh = TriangleMesh::new(
+            vec![
+                [0.0f32, 0.0, 0.0],
+                [1.0, 0.0, 0.0],
+                [0.0, f32::NAN, 0.0],
+                [0.0, 1.0, 0.0],
+                [f32::INFINITY, 0.0, 0.0],
+            ],
+            vec![[0, 1, 2], [0, 1, 3], [0, 1, 4]],
+        )
+        .unwrap();
+        assert_eq!([0, 1, 2].map(|prim| mesh.bound(prim).is_valid()), [false, true, false]);
+    }
+
+    #[test]
+    fn a_spawned_ray_does_not_meet_its_surface() {
+        let mesh = TriangleMesh::new(
+            vec![[0.1f32, 0.2, 1e4], [7.3, 0.4, 1.1e4], [0.5, 9.6, 1.2e4]],
+            vec![[0, 1, 2]],
+        )
+        .unwrap();
+        let mut hits = 0;
+        for i in 0..100 {
+            for j in 0..100 - i {
+                let (x, y) = (i as f32 * 0.07 + 0.3, j as f32 * 0.09 + 0.3);
+                let ray = Ray::new(Vec3A::new(x, y, 0.0), Vec3A::new(1e-5, 2e-5, 1.0));
+                let Some(hit) = Geometry::<f32>::intersect(&mesh, 0, &ray) else { continue };
+                hits += 1;
+                let surface = mesh.surface(&ray, &hit);
+                for dir in
+                    [Vec3A::new(0.3, 0.2, -1.0), Vec3A::Y, -Vec3A::X, Vec3A::new(1.0, -2.0, 5.0), ray.dir]
+                {
+                    assert!(!Geometry::<f32>::intersect_p(&mesh, 0, &surface.spawn(dir)), "{surface:?}");
+                    assert!(!Geometry::<f64>::intersect_p(&mesh, 0, &surface.spawn(dir.as_dvec3())));
+                }
+            }
+        }
+        assert!(hits > 2000);
+    }
+}
