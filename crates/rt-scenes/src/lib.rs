@@ -1,1 +1,30 @@
-//! placeholder
+//! Scenes to try ray tracing on: Haines' Standard Procedural Databases, OBJ files, random soups, a teapot in a stadium, and
+//! inputs meant to hurt.
+//!
+//! * A [`Scene`] is what a picture needs: shapes, looks, lights, a view. [`by_name`] makes one of [`names`]; [`obj::load`]
+//!   reads one.
+//! * A [`Trial`] is a small mesh with a name. [`trials`] lists what every structure must answer rightly on, [`closed_meshes`]
+//!   those that no ray from inside may leave.
+//!
+//! ```
+//! let scene = rt_scenes::by_name("balls", Some(2))?;
+//! assert_eq!(scene.prim_count(), 91 + 1);
+//! assert_eq!(scene.lights.len(), 3);
+//! assert_eq!(scene.material(1).color, [1.0, 0.9, 0.7]);
+//! # Ok::<(), rt_scenes::SceneError>(())
+//! ```
+//!
+//! # Invariants
+//!
+//! A scene depends on its name and numbers alone, to the last bit, on every machine: generators use only operations that
+//! IEEE 754 rounds correctly, and random numbers of their own. Nothing here prints, or panics on any input or file.
+
+pub mod obj;
+pub mod spd;
+
+mod numbers;
+mod scene;
+mod solid;
+
+pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, by_name, names};
+pub use solid::Solid;

@@ -1,0 +1,271 @@
+//! [`Scene`]: shapes, looks, lights, a view.
+
+use crate::{Solid, spd};
+use core::fmt;
+use rt_accel::{Bounded, WorldBound};
+use rt_bounds::Aabb;
+use rt_geom::glam::DVec3;
+use rt_shapes::TriangleMesh;
+
+/// A scene: shapes, looks, lights, a view.
+///
+/// See the [crate](crate) for an example.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// What it is called.
+    pub name: String,
+    /// What there is to hit.
+    pub geometry: SceneGeometry,
+    /// The looks, by number.
+    pub materials: Vec<Material>,
+    /// Material number of each primitive (triangle or solid); empty: all number 0.
+    pub material_of: Vec<u32>,
+    /// The lights, points all.
+    pub lights: Vec<Light>,
+    /// Where it is seen from.
+    pub view: View,
+    /// What rays see that hit nothing, red, green, blue.
+    pub background: [f32; 3],
+    /// What a reader of the file it came from should know, in sentences; empty for scenes made here.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// How many primitives there are, triangles or solids.
+    pub fn prim_count(&self) -> usize {
+        match &self.geometry {
+            SceneGeometry::Mesh(mesh) => mesh.triangles().len(),
+            SceneGeometry::FineMesh(mesh) => mesh.triangles().len(),
+            SceneGeometry::Solids(solids) => solids.len(),
+        }
+    }
+
+    /// A box around all primitives that have a valid one, rounded outward; empty when there are none. `O(n)`.
+    pub fn world_bound(&self) -> Aabb {
+        match &self.geometry {
+            SceneGeometry::Mesh(mesh) => bound(mesh),
+            SceneGeometry::FineMesh(mesh) => bound(mesh),
+            SceneGeometry::Solids(solids) => {
+                solids.iter().fold(Aabb::EMPTY, |b, solid| b.union(solid.world_bound()))
+            }
+        }
+    }
+
+    /// The look of primitive `prim`; the [default](Material::default) one where none is given.
+    pub fn material(&self, prim: u32) -> Material {
+        let number = self.material_of.get(prim as usize).copied().unwrap_or(0);
+        self.materials.get(number as usize).copied().unwrap_or_default()
+    }
+}
+
+/// A box around the valid primitives.
+pub(crate) fn bound(prims: &impl Bounded) -> Aabb {
+    (0..prims.prim_count() as u32)
+        .map(|prim| prims.bound(prim))
+        .filter(|b| b.is_valid())
+        .fold(Aabb::EMPTY, Aabb::union)
+}
+
+/// What there is to hit in a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SceneGeometry {
+    /// Triangles.
+    Mesh(TriangleMesh),
+    /// Triangles too small for their distance from zero to be told apart in `f32`; they answer `f64` rays.
+    FineMesh(TriangleMesh<f64>),
+    /// Spheres and polygons.
+    Solids(Vec<Solid>),
+}
+
+/// How a surface looks: the numbers of an NFF file's `f` line.
+///
+/// Source: Haines, *Neutral File Format* 3.1, in the Standard Procedural Databases.
+///
+/// ```
+/// use rt_scenes::Material;
+/// let glass = Material { kd: 0.0, ks: 0.1, transmittance: 0.9, ior: 1.5, ..Material::default() };
+/// assert!(glass.ks > 0.0 || glass.transmittance > 0.0); // rays are reflected
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Red, green, blue, each in `[0, 1]`.
+    pub color: [f32; 3],
+    /// Share of light scattered evenly.
+    pub kd: f32,
+    /// Share of light mirrored; also the strength of highlights.
+    pub ks: f32,
+    /// Phong power of highlights; 100000 and more stand for none.
+    pub shine: f32,
+    /// Share of light let through.
+    pub transmittance: f32,
+    /// Index of refraction, above 0; matters where light is let through.
+    pub ior: f32,
+}
+
+/// A light grey that mirrors nothing.
+impl Default for Material {
+    fn default() -> Material {
+        Material { color: [0.8; 3], kd: 1.0, ks: 0.0, shine: 100_000.0, transmittance: 0.0, ior: 1.0 }
+    }
+}
+
+/// A point light. Its strength does not fall off with distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Where it is, in world space.
+    pub position: DVec3,
+    /// Red, green, blue; white at full strength is 1 each.
+    pub color: [f32; 3],
+}
+
+impl Light {
+    /// White lights at `positions`, each of the strength `sqrt(n) / (2 n)` that SPD suggests for `n` lights and for the light
+    /// that comes from everywhere.
+    pub fn shared(positions: &[[f64; 3]]) -> Vec<Light> {
+        let n = positions.len() as f32;
+        positions
+            .iter()
+            .map(|&p| Light { position: DVec3::from_array(p), color: [n.sqrt() / (2.0 * n); 3] })
+            .collect()
+    }
+}
+
+/// Where a scene is seen from: the pinhole camera of an NFF file, of a square picture.
+///
+/// ```
+/// use rt_bounds::Aabb;
+/// use rt_geom::glam::Vec3A;
+/// use rt_scenes::View;
+/// let view = View::framing(&Aabb::new(Vec3A::ZERO, Vec3A::splat(2.0)));
+/// assert_eq!(view.at.to_array(), [1.0; 3]);
+/// assert!(view.from.min_element() > 2.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The eye.
+    pub from: DVec3,
+    /// A point in the middle of the picture.
+    pub at: DVec3,
+    /// What is up in the picture; of any length, not along the line of sight.
+    pub up: DVec3,
+    /// The full field of view, in radians, across and down alike; above 0, below pi.
+    pub angle: f64,
+}
+
+impl View {
+    /// A three-quarter view from above in which the whole box is visible, with some room around it.
+    ///
+    /// Up is y, as in most mesh files, unless the box lies flat in z: less than a quarter as high as it is long and wide. A
+    /// box that is not finite, or empty, is seen as the unit cube would be; a point as if it had the size of its distance
+    /// from zero.
+    pub fn framing(bound: &Aabb) -> View {
+        let usable = bound.is_valid() && bound.min.is_finite() && bound.max.is_finite();
+        let (min, max) = if usable {
+            (bound.min.as_dvec3(), bound.max.as_dvec3())
+        } else {
+            (DVec3::splat(-0.5), DVec3::splat(0.5))
+        };
+        let at = min * 0.5 + max * 0.5;
+        let mut half = (max - min) * 0.5;
+        if half == DVec3::ZERO {
+            let far = at.abs().max_element();
+            half = DVec3::splat(if far > 0.0 { far } else { 1.0 });
+        }
+        let flat = 4.0 * half.z < half.x && 4.0 * half.z < half.y;
+        let (toward, up) = if flat {
+            (DVec3::new(0.55, -0.75, 0.6), DVec3::Z)
+        } else {
+            (DVec3::new(0.55, 0.45, 0.8), DVec3::Y)
+        };
+        let toward = toward.normalize();
+        let right = up.cross(toward).normalize();
+        let over = toward.cross(right);
+        let angle = std::f64::consts::FRAC_PI_4;
+        // sqrt(2) - 1, the tangent of half the angle.
+        let tan = std::f64::consts::SQRT_2 - 1.0;
+        // Each corner asks for a distance from which it is seen; a tenth is left for room.
+        let mut distance = 0.0f64;
+        for corner in 0..8 {
+            let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let corner = half * DVec3::new(sign(0), sign(1), sign(2));
+            let side = corner.dot(right).abs().max(corner.dot(over).abs());
+            distance = distance.max(1.1 * side / tan + corner.dot(toward));
+        }
+        View { from: at + toward * distance, at, up, angle }
+    }
+
+    /// A light at the upper left behind the eye, and as far from what is seen again as the eye.
+    pub(crate) fn key_light(&self) -> Light {
+        let back = self.from - self.at;
+        let right = self.up.cross(back).normalize_or_zero();
+        let over = back.cross(right).normalize_or_zero();
+        let position = self.at + back * 1.5 + (over - right) * back.length();
+        Light { position, color: [1.0; 3] }
+    }
+}
+
+/// Why there is no such scene.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// No scene has this name.
+    Unknown {
+        /// The name.
+        name: String,
+    },
+    /// The scene is not made in this size.
+    Size {
+        /// The scene.
+        name: &'static str,
+        /// The size asked for.
+        size: u32,
+        /// The least size there is.
+        min: u32,
+        /// The greatest: beyond it the scene would fill more memory than most machines have.
+        max: u32,
+    },
+}
+
+impl fmt::Display for SceneError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SceneError::Unknown { name } => {
+                write!(f, "there is no scene {name:?}; there are {}", names().join(", "))
+            }
+            SceneError::Size { name, size, min, max } => {
+                write!(f, "scene {name} comes in sizes {min} to {max}, not {size}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SceneError {}
+
+/// `size`, if it lies in the range in which the scene is made.
+pub(crate) fn sized(name: &'static str, size: u32, min: u32, max: u32) -> Result<u32, SceneError> {
+    if (min..=max).contains(&size) { Ok(size) } else { Err(SceneError::Size { name, size, min, max }) }
+}
+
+/// A scene by its name, of its default size where none is given.
+type Maker = fn(Option<u32>) -> Result<Scene, SceneError>;
+
+/// All scenes, each by name.
+const SCENES: &[(&str, Maker)] =
+    &[("balls", |size| spd::balls(size.unwrap_or(4))), ("tetra", |size| spd::tetra(size.unwrap_or(6)))];
+
+/// The names of the scenes [`by_name`] knows.
+pub fn names() -> Vec<&'static str> {
+    SCENES.iter().map(|scene| scene.0).collect()
+}
+
+/// The scene called `name`, in `size`; without one, in its default size. What sizes mean is up to the scene.
+///
+/// # Errors
+///
+/// When there is no such scene, or not in this size.
+pub fn by_name(name: &str, size: Option<u32>) -> Result<Scene, SceneError> {
+    match SCENES.iter().find(|scene| scene.0 == name) {
+        Some((_, make)) => make(size),
+        None => Err(SceneError::Unknown { name: name.to_string() }),
+    }
+}

@@ -1,0 +1,91 @@
+//! [`Solid`]: one shape of a mixed scene.
+
+use core::ops::ControlFlow;
+use rt_accel::{Counts, Hit, Primitive, WorldBound};
+use rt_bounds::Aabb;
+use rt_geom::glam::DVec3;
+use rt_geom::{Ray, Real};
+use rt_shapes::{Polygon, Shape, Sphere, Surface, Uv};
+
+/// One solid of a mixed scene: answers as the shape inside does, rays of both precisions.
+///
+/// A closed set of shapes, so that a list of them is flat in memory and no call is virtual.
+///
+/// ```
+/// use rt_accel::{Aggregate, Exhaustive, Primitive};
+/// use rt_geom::{Ray, glam::{DVec3, Vec3A}};
+/// use rt_scenes::Solid;
+/// use rt_shapes::Sphere;
+///
+/// let ball = Solid::from(Sphere::new(DVec3::new(0.0, 0.0, 5.0), 1.0)?);
+/// let scene = Aggregate::<Exhaustive, _>::build(vec![ball], &())?;
+/// assert_eq!(scene.intersect(&Ray::new(Vec3A::ZERO, Vec3A::Z)).unwrap().t, 4.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Solid {
+    /// A sphere.
+    Sphere(Sphere),
+    /// A planar polygon.
+    Polygon(Polygon),
+}
+
+impl From<Sphere> for Solid {
+    fn from(sphere: Sphere) -> Solid {
+        Solid::Sphere(sphere)
+    }
+}
+
+impl From<Polygon> for Solid {
+    fn from(polygon: Polygon) -> Solid {
+        Solid::Polygon(polygon)
+    }
+}
+
+/// The same call on whichever shape is inside.
+macro_rules! each {
+    ($solid:expr, $shape:ident => $call:expr) => {
+        match $solid {
+            Solid::Sphere($shape) => $call,
+            Solid::Polygon($shape) => $call,
+        }
+    };
+}
+
+impl WorldBound for Solid {
+    fn world_bound(&self) -> Aabb {
+        each!(self, shape => shape.world_bound())
+    }
+    fn world_bound_from(&self, origin: DVec3) -> Aabb {
+        each!(self, shape => shape.world_bound_from(origin))
+    }
+}
+
+impl<R: Real> Primitive<R> for Solid {
+    type At = Uv;
+
+    #[inline]
+    fn intersect(&self, ray: &Ray<R>) -> Option<Hit<Uv, R>> {
+        each!(self, shape => shape.intersect(ray))
+    }
+    #[inline]
+    fn intersect_p(&self, ray: &Ray<R>) -> bool {
+        each!(self, shape => shape.intersect_p(ray))
+    }
+    fn all_hits(&self, ray: &Ray<R>, each: &mut dyn FnMut(Hit<Uv, R>) -> ControlFlow<()>) -> ControlFlow<()> {
+        each!(self, shape => shape.all_hits(ray, each))
+    }
+    fn intersect_counted(&self, ray: &Ray<R>, counts: &mut Counts) -> Option<Hit<Uv, R>> {
+        each!(self, shape => shape.intersect_counted(ray, counts))
+    }
+    fn intersect_p_counted(&self, ray: &Ray<R>, counts: &mut Counts) -> bool {
+        each!(self, shape => shape.intersect_p_counted(ray, counts))
+    }
+}
+
+impl<R: Real> Shape<R> for Solid {
+    fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
+        each!(self, shape => shape.surface(ray, hit))
+    }
+}
