@@ -1,0 +1,260 @@
+//! The slab test against exact arithmetic: it may say *hit* too often, never *miss* wrongly.
+
+use proptest::prelude::*;
+use rt_bounds::{Aabb, SlabRay};
+use rt_geom::glam::{DVec3, Vec3A};
+use rt_geom::{Ray, Real, Vector};
+use rt_measure::conform::paste;
+use rt_measure::exact::{self, Span};
+use rt_measure::rays::Seeded;
+
+/// A number of any size up to `2^125`: often zero, of either sign, often small and whole, often subnormal.
+fn coordinate(seeded: &mut Seeded) -> f32 {
+    let wild = |seeded: &mut Seeded, low: i32, high: i32| {
+        let exponent = low + seeded.below((high - low + 1) as usize) as i32;
+        let x = (1.0 + seeded.unit()) * 2f64.powi(exponent);
+        (if seeded.below(2) == 0 { x } else { -x }) as f32
+    };
+    match seeded.below(12) {
+        0 => 0.0,
+        1 => -0.0,
+        2..=4 => seeded.below(9) as f32 - 4.0,
+        5 => wild(seeded, -149, -120),
+        6 => wild(seeded, -149, 124),
+        7 => wild(seeded, 100, 124),
+        8 => [f32::from_bits(1), -f32::from_bits(1), f32::MIN_POSITIVE, 4.253_529_6e37][seeded.below(4)],
+        _ => wild(seeded, -4, 4),
+    }
+}
+
+fn length(seeded: &mut Seeded) -> f64 {
+    [1e-30, 1e-20, 1e-3, 1.0, 1.0, 1.0, 1e3, 1e20, 1e30][seeded.below(9)]
+}
+
+fn a_box(seeded: &mut Seeded) -> Aabb {
+    let mut b = Aabb::EMPTY;
+    for a in 0..3 {
+        let (x, y) = (coordinate(seeded), coordinate(seeded));
+        // Flat and thin ones, and some without end.
+        let y = match seeded.below(6) {
+            0 | 1 => x,
+            2 => x.next_up(),
+            _ => y,
+        };
+        b.min[a] = if seeded.below(24) == 0 { f32::NEG_INFINITY } else { x.min(y) };
+        b.max[a] = if seeded.below(24) == 0 { f32::INFINITY } else { x.max(y) };
+    }
+    b
+}
+
+/// A place on the box's corners, edges and faces, in it or near it.
+fn place(seeded: &mut Seeded, b: &Aabb) -> DVec3 {
+    let mut p = DVec3::ZERO;
+    for a in 0..3 {
+        let (min, max) = (b.min[a].max(f32::MIN), b.max[a].min(f32::MAX));
+        let x = match seeded.below(6) {
+            0 | 1 => min,
+            2 | 3 => max,
+            4 => (min as f64 + (max as f64 - min as f64) * seeded.unit()) as f32,
+            _ => coordinate(seeded),
+        };
+        p[a] = x.clamp(-4.253_529_6e37, 4.253_529_6e37) as f64;
+    }
+    p
+}
+
+fn a_ray<R: Real>(seeded: &mut Seeded, b: &Aabb) -> Ray<R> {
+    let mut origin = if seeded.below(3) == 0 {
+        place(seeded, b)
+    } else {
+        DVec3::new(coordinate(seeded) as f64, coordinate(seeded) as f64, coordinate(seeded) as f64)
+    };
+    let mut dir = match seeded.below(4) {
+        0 => DVec3::new(coordinate(seeded) as f64, coordinate(seeded) as f64, coordinate(seeded) as f64),
+        1 => seeded.direction() * length(seeded),
+        _ => place(seeded, b) - origin,
+    };
+    if seeded.below(4) == 0 {
+        let (target, scale) = (place(seeded, b), length(seeded));
+        dir = (target - origin) * scale;
+    }
+    for a in 0..3 {
+        if seeded.below(5) == 0 {
+            dir[a] = if seeded.below(2) == 0 { 0.0 } else { -0.0 };
+        }
+        // Exactly on a plane of the box.
+        if seeded.below(6) == 0 && b.min[a].is_finite() {
+            origin[a] = b.min[a] as f64;
+        }
+    }
+    Ray::new(R::Vec3::nearest(origin), R::Vec3::nearest(dir))
+}
+
+fn span_of<R: Real>(ray: &Ray<R>, min: DVec3, max: DVec3) -> Option<Span> {
+    let (o, d) = (ray.origin.widen().to_array(), ray.dir.widen().to_array());
+    exact::aabb(o, d, min.to_array(), max.to_array())
+}
+
+/// Intervals around a span: without end, and ending at its ends as exactly as `R` can say.
+fn intervals<R: Real>(seeded: &mut Seeded, span: &Span) -> Vec<(R, R)> {
+    let below = R::ZERO - R::nearest(1.0);
+    let mut intervals = vec![
+        (R::ZERO, R::INFINITY),
+        (-R::INFINITY, R::INFINITY),
+        (below, R::INFINITY),
+        (R::nearest(coordinate(seeded) as f64), R::INFINITY),
+    ];
+    let ends = |t: Option<&exact::Rational>, none: R| t.map_or(none, |t| t.nearest());
+    let enter = ends(span.enter.as_ref(), -R::INFINITY);
+    let exit = ends(span.exit.as_ref(), R::INFINITY);
+    for t in [enter, exit] {
+        for t in [t.next_down(), t, t.next_up()] {
+            intervals.extend([(t, t), (R::ZERO, t), (t, R::INFINITY), (-R::INFINITY, t), (below, t)]);
+        }
+    }
+    intervals.retain(|(a, b)| a <= b);
+    intervals
+}
+
+/// The first wrong miss.
+fn wrong_miss<R: Real>(ray: &Ray<R>, origin: DVec3, b: &Aabb, world: &Aabb) -> Option<String> {
+    let mut shortened = SlabRay::new(&ray.between(ray.t_min, R::INFINITY), origin, world);
+    shortened.shorten(ray.t_max);
+    let made = SlabRay::new(ray, origin, world);
+    let missed = made.entry(b).is_none() || shortened.entry(b).is_none();
+    missed.then(|| {
+        let corner = |v: Vec3A| v.to_array().map(f32::to_bits);
+        format!("{}\n box {b:?} bits {:x?} {:x?} origin {origin}", paste(ray), corner(b.min), corner(b.max))
+    })
+}
+
+/// Draws boxes and rays; returns the wrong misses and how many hits were asked about.
+fn adversarial<R: Real>(seed: u64, cases: usize) -> (Vec<String>, usize) {
+    let mut seeded = Seeded::new(seed);
+    let (mut wrong, mut hits) = (Vec::new(), 0);
+    for _ in 0..cases {
+        let b = a_box(&mut seeded);
+        let mut ray: Ray<R> = a_ray(&mut seeded, &b);
+        if !ray.is_valid() || !b.is_valid() {
+            continue;
+        }
+        let world = if seeded.below(2) == 0 { b } else { b.union(a_box(&mut seeded)) };
+        let Some(span) = span_of(&ray, b.min.as_dvec3(), b.max.as_dvec3()) else { continue };
+        for (t_min, t_max) in intervals(&mut seeded, &span) {
+            ray = ray.between(t_min, t_max);
+            if span.meets(t_min.into(), t_max.into()) {
+                hits += 1;
+                wrong.extend(wrong_miss(&ray, DVec3::ZERO, &b, &world));
+            }
+        }
+    }
+    (wrong, hits)
+}
+
+/// Boxes far away, made relative to an origin near them.
+fn far_away<R: Real>(seed: u64, cases: usize) -> (Vec<String>, usize) {
+    let mut seeded = Seeded::new(seed);
+    let (mut wrong, mut hits) = (Vec::new(), 0);
+    for _ in 0..cases {
+        let far = [1e3, 1e7, 1e12, 1e30][seeded.below(4)];
+        let origin =
+            DVec3::new(far, seeded.between(-far, far), if seeded.below(2) == 0 { 0.0 } else { -far });
+        let size = far * [1e-15, 1e-9, 1e-6, 1e-3, 1.0][seeded.below(5)];
+        let near = |seeded: &mut Seeded| {
+            let p = origin + seeded.direction() * size;
+            R::Vec3::nearest(p).widen()
+        };
+        let (p, q) = (near(&mut seeded), near(&mut seeded));
+        let (min, mut max) = (p.min(q), p.max(q));
+        let flat = seeded.below(6);
+        if flat < 3 {
+            max[flat] = min[flat];
+        }
+        let b = Aabb::from_f64(min, max, origin);
+        let world = if seeded.below(2) == 0 { b } else { b.union(Aabb::from_f64(origin, q, origin)) };
+        let start = if seeded.below(2) == 0 { near(&mut seeded) } else { seeded.direction() * far };
+        let target = if seeded.below(2) == 0 { min } else { max };
+        let mut dir = (target - start) * length(&mut seeded);
+        let axis = seeded.below(9);
+        if axis < 3 {
+            dir[axis] = -0.0;
+        }
+        let mut ray: Ray<R> = Ray::new(R::Vec3::nearest(start), R::Vec3::nearest(dir));
+        if !ray.is_valid() || !b.is_valid() {
+            continue;
+        }
+        let Some(span) = span_of(&ray, min, max) else { continue };
+        for (t_min, t_max) in intervals(&mut seeded, &span) {
+            ray = ray.between(t_min, t_max);
+            if span.meets(t_min.into(), t_max.into()) {
+                hits += 1;
+                wrong.extend(wrong_miss(&ray, origin, &b, &world));
+            }
+        }
+    }
+    (wrong, hits)
+}
+
+fn none_wrong((wrong, hits): (Vec<String>, usize), least: usize) {
+    assert!(hits >= least, "only {hits} hits");
+    let first = wrong.iter().take(5).cloned().collect::<Vec<_>>().join("\n");
+    assert!(wrong.is_empty(), "{} of {hits} hits missed:\n{first}", wrong.len());
+}
+
+/// The test that everybody writes first.
+fn textbook(ray: &Ray<f32>, b: &Aabb) -> bool {
+    let (p, q) = ((b.min - ray.origin) / ray.dir, (b.max - ray.origin) / ray.dir);
+    p.min(q).max_element().max(ray.t_min) <= p.max(q).min_element().min(ray.t_max)
+}
+
+#[test]
+fn the_cases_are_hostile_enough() {
+    let mut seeded = Seeded::new(1);
+    let (mut missed, mut hits) = (0, 0);
+    for _ in 0..20_000 {
+        let b = a_box(&mut seeded);
+        let ray: Ray = a_ray(&mut seeded, &b);
+        let span = if ray.is_valid() { span_of(&ray, b.min.as_dvec3(), b.max.as_dvec3()) } else { None };
+        if span.is_some_and(|span| span.meets(0.0, f64::INFINITY)) {
+            hits += 1;
+            missed += usize::from(!textbook(&ray, &b));
+        }
+    }
+    assert!(missed * 20 > hits, "the textbook misses {missed} of {hits} only");
+}
+
+#[test]
+fn no_wrong_miss_in_f32() {
+    none_wrong(adversarial::<f32>(1, 300_000), 500_000);
+}
+
+#[test]
+fn no_wrong_miss_in_f64() {
+    none_wrong(adversarial::<f64>(2, 300_000), 500_000);
+}
+
+#[test]
+fn no_wrong_miss_far_away_in_f32() {
+    none_wrong(far_away::<f32>(3, 50_000), 50_000);
+}
+
+#[test]
+fn no_wrong_miss_far_away_in_f64() {
+    none_wrong(far_away::<f64>(4, 50_000), 50_000);
+}
+
+proptest! {
+    #[test]
+    fn no_wrong_miss_at_all(corners: [[f32; 3]; 2], o: [f32; 3], d: [f32; 3], t_min: f32) {
+        let reach = |v: [f32; 3]| Vec3A::from_array(v.map(|x| x.clamp(-4e37, 4e37)));
+        let [p, q] = corners.map(reach);
+        let b = Aabb::new(p.min(q), p.max(q));
+        let ray = Ray::new(reach(o), reach(d)).between(t_min, f32::INFINITY);
+        prop_assume!(ray.is_valid() && b.is_valid());
+        let span = span_of(&ray, b.min.as_dvec3(), b.max.as_dvec3());
+        if span.is_some_and(|span| span.meets(t_min.into(), f64::INFINITY)) {
+            let wrong = wrong_miss(&ray, DVec3::ZERO, &b, &b);
+            prop_assert!(wrong.is_none(), "{}", wrong.unwrap_or_default());
+        }
+    }
+}
