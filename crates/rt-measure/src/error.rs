@@ -1,9 +1,9 @@
 //! How wrong: errors of hits and of images.
 
-use crate::exact::Rational;
+use crate::exact::{Corners, Rational, closest, triangle};
 use core::fmt;
 use core::ops::{Add, AddAssign};
-use rt_geom::Real;
+use rt_geom::{Ray, Real, Vector};
 
 /// What some rays got wrong, against the exact answers.
 ///
@@ -43,6 +43,22 @@ impl HitError {
             (Some((prim, _)), Some((other, _))) if prim != other => self.wrong += 1,
             (Some((_, exact)), Some((_, t))) => self.t_ulp = self.t_ulp.max(ulps(exact, t)),
         }
+    }
+
+    /// Judges the closest hit of a ray among triangles.
+    ///
+    /// Where several triangles are equally close, exactly or after rounding, any of them is right: at an edge that is met
+    /// exactly, neither neighbour is an error. Which of them the contract asks for is a matter of conformance.
+    pub fn judge_triangles<R: Real>(&mut self, ray: &Ray<R>, triangles: &[Corners], found: Option<(u32, R)>) {
+        let Some(truth) = closest(ray, triangles.iter().copied()) else { return self.judge(None, found) };
+        let exact = truth.root.exact();
+        let (origin, dir) = (ray.origin.widen().to_array(), ray.dir.widen().to_array());
+        let tie = found.filter(|(prim, _)| *prim != truth.prim).and_then(|(prim, _)| {
+            let other = triangle(origin, dir, *triangles.get(prim as usize)?)?.exact();
+            (other == exact || other.nearest::<R>() == truth.t).then_some((prim, other))
+        });
+        let (prim, exact) = tie.unwrap_or((truth.prim, exact));
+        self.judge(Some((prim, &exact)), found);
     }
 
     /// [`HitError::missed`] per million rays; 0 for no rays, like the other rates.
@@ -197,6 +213,24 @@ mod tests {
         assert_eq!(sum.invented_per_million(), 200_000.0);
         assert_eq!(HitError::default().wrong_per_million(), 0.0);
         assert!(!sum.is_exact() && HitError::default().is_exact());
+    }
+
+    #[test]
+    fn either_neighbour_is_right_at_an_edge() {
+        use rt_geom::glam::Vec3A;
+        let [a, b, c, d] = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
+        let triangles = [[a, b, c], [a, c, d], [a, b, c].map(|v| [v[0], v[1], 2.0])];
+        let edge = Ray::new(Vec3A::new(0.5, 0.5, 0.0), Vec3A::Z);
+        let mut error = HitError::default();
+        for prim in [0, 1] {
+            error.judge_triangles(&edge, &triangles, Some((prim, 1.0)));
+        }
+        assert_eq!(error, HitError { rays: 2, ..HitError::default() });
+        for found in [None, Some((2, 2.0)), Some((9, 1.0))] {
+            error.judge_triangles(&edge, &triangles, found);
+        }
+        error.judge_triangles(&Ray { dir: -edge.dir, ..edge }, &triangles, Some((0, -1.0)));
+        assert_eq!(error, HitError { rays: 6, missed: 1, invented: 1, wrong: 2, t_ulp: 0.0 });
     }
 
     #[test]

@@ -23,10 +23,11 @@
 //! let found = exact::closest(&ray, [[a, b, c], [a, c, d]]).unwrap();
 //! assert_eq!((found.prim, found.t), (0, 1.0));
 //!
-//! // Somebody else's answer, judged.
+//! // Somebody else's answers, judged: naming the neighbour is no error, losing the ray is.
 //! let mut error = HitError::default();
-//! error.judge(Some((found.prim, &found.root.exact())), Some((1, 1.0f32)));
-//! assert_eq!(error.wrong, 1);
+//! error.judge_triangles(&ray, &[[a, b, c], [a, c, d]], Some((1, 1.0)));
+//! error.judge_triangles(&ray, &[[a, b, c], [a, c, d]], None);
+//! assert_eq!((error.wrong, error.missed), (0, 1));
 //! ```
 //!
 //! # Invariants
