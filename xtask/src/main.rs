@@ -1,1 +1,64 @@
-fn main() {}
+//! The tasks of the workspace. `cargo xtask --help` lists them.
+//!
+//! Results go to stdout, everything else to stderr. Exit codes: 0 all is well, 1 a check failed, 2 the command line is
+//! wrong, 3 a file is missing, malformed or cannot be written, 130 interrupted.
+
+// The one place of the workspace that talks to people.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod ci;
+mod failure;
+mod golden;
+mod output;
+mod render;
+mod stage;
+mod structures;
+mod tidy;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Tasks of the rt workspace.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", version, after_help = EXAMPLES)]
+struct Args {
+    #[command(subcommand)]
+    task: Task,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask render                    a picture of balls in out/balls.png
+  cargo xtask render tetra --explain    another scene, and what it leaves out
+  cargo xtask golden                    has any reference picture changed?
+  cargo xtask ci                        everything a server checks
+
+Exit codes: 0 ok, 1 a check failed, 2 wrong usage, 3 a file is missing, malformed or not writable, 130 interrupted.";
+
+#[derive(Subcommand)]
+enum Task {
+    /// Make a picture, and say what it took.
+    Render(render::Args),
+    /// Compare small pictures of every structure with the reference ones, bit for bit.
+    Golden(golden::Args),
+    /// Check the rules of the house that no compiler knows.
+    Tidy(tidy::Args),
+    /// Everything a server checks: format, lints, docs, tidy, golden, features one by one.
+    Ci(ci::Args),
+}
+
+fn main() -> ExitCode {
+    let result = match Args::parse().task {
+        Task::Render(args) => render::run(&args),
+        Task::Golden(args) => golden::run(&args),
+        Task::Tidy(args) => tidy::run(&args),
+        Task::Ci(args) => ci::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            failure.code()
+        }
+    }
+}

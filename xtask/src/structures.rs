@@ -1,0 +1,31 @@
+//! The structures, by name: the one place where names become types.
+
+use rt_accel::Structure;
+
+/// Something to be done with a structure whose name was given.
+pub(crate) trait Job {
+    /// What comes of it.
+    type Out;
+    /// Does it.
+    fn run<S: Structure + 'static>(self) -> Self::Out;
+}
+
+macro_rules! structures {
+    ($($name:literal => $structure:ty),* $(,)?) => {
+        /// All names.
+        pub(crate) const NAMES: &[&str] = &[$($name),*];
+
+        /// Does `job` with the structure called `name`; without such a structure, says which there are.
+        pub(crate) fn with<J: Job>(name: &str, job: J) -> Result<J::Out, String> {
+            match name {
+                $($name => Ok(job.run::<$structure>()),)*
+                _ => Err(format!("there is no structure {name:?}; there are {}", NAMES.join(", "))),
+            }
+        }
+    };
+}
+
+structures! {
+    "bvh" => rt_bvh::Bvh,
+    "exhaustive" => rt_accel::Exhaustive,
+}
