@@ -19,12 +19,19 @@
 //! A scene depends on its name and numbers alone, to the last bit, on every machine: generators use only operations that
 //! IEEE 754 rounds correctly, and random numbers of their own. Nothing here prints, or panics on any input or file.
 
+pub mod fine;
+pub mod hostile;
 pub mod obj;
+pub mod soup;
 pub mod spd;
+pub mod stadium;
 
 mod numbers;
 mod scene;
 mod solid;
+mod teapot;
+mod trial;
 
 pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, by_name, names};
 pub use solid::Solid;
+pub use trial::{Closed, Trial, closed_meshes, fine_trials, trials};

@@ -240,16 +240,8 @@ fn parse(bytes: &[u8], name: &str, folder: Option<&Path>) -> Result<Scene, ObjEr
         shown.truncate(1);
     }
     let view = View::framing(&scene::bound(&mesh));
-    Ok(Scene {
-        name: name.to_string(),
-        geometry: SceneGeometry::Mesh(mesh),
-        materials: shown,
-        material_of,
-        lights: vec![view.key_light()],
-        view,
-        background: [0.9, 0.92, 0.95],
-        warnings,
-    })
+    let plain = scene::framed(name.to_string(), SceneGeometry::Mesh(mesh), view);
+    Ok(Scene { materials: shown, material_of, warnings, ..plain })
 }
 
 #[cfg(test)]

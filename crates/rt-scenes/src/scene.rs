@@ -1,10 +1,10 @@
 //! [`Scene`]: shapes, looks, lights, a view.
 
-use crate::{Solid, spd};
+use crate::{Solid, fine, soup, spd, stadium};
 use core::fmt;
 use rt_accel::{Bounded, WorldBound};
 use rt_bounds::Aabb;
-use rt_geom::glam::DVec3;
+use rt_geom::glam::{DVec3, Vec3A};
 use rt_shapes::TriangleMesh;
 
 /// A scene: shapes, looks, lights, a view.
@@ -224,6 +224,11 @@ pub enum SceneError {
         /// The greatest: beyond it the scene would fill more memory than most machines have.
         max: u32,
     },
+    /// The stadium is not that many times larger than its teapot, for any teapot.
+    Ratio {
+        /// The ratio asked for.
+        ratio: f64,
+    },
 }
 
 impl fmt::Display for SceneError {
@@ -234,6 +239,9 @@ impl fmt::Display for SceneError {
             }
             SceneError::Size { name, size, min, max } => {
                 write!(f, "scene {name} comes in sizes {min} to {max}, not {size}")
+            }
+            SceneError::Ratio { ratio } => {
+                write!(f, "a stadium is 1 to 1e7 times as large as its teapot, not {ratio}")
             }
         }
     }
@@ -250,8 +258,64 @@ pub(crate) fn sized(name: &'static str, size: u32, min: u32, max: u32) -> Result
 type Maker = fn(Option<u32>) -> Result<Scene, SceneError>;
 
 /// All scenes, each by name.
-const SCENES: &[(&str, Maker)] =
-    &[("balls", |size| spd::balls(size.unwrap_or(4))), ("tetra", |size| spd::tetra(size.unwrap_or(6)))];
+const SCENES: &[(&str, Maker)] = &[
+    ("balls", |size| spd::balls(size.unwrap_or(4))),
+    ("tetra", |size| spd::tetra(size.unwrap_or(6))),
+    ("stadium", |size| stadium::stadium(870.0, size.unwrap_or(12))),
+    ("soup", |size| triangles("soup", size, |n| soup::uniform(n, 1))),
+    ("clusters", |size| triangles("clusters", size, |n| soup::clusters(n, 1))),
+    ("sticks", |size| triangles("sticks", size, |n| soup::sticks(n, 1e3, 1))),
+    ("needles", |size| triangles("needles", size, soup::needles)),
+    ("icosphere", |size| {
+        Ok(around("icosphere", soup::icosphere(sized("icosphere", size.unwrap_or(5), 0, 10)?)))
+    }),
+    ("crumpled", |size| {
+        Ok(around("crumpled", soup::crumpled(sized("crumpled", size.unwrap_or(4), 0, 10)?, 4.0, 1)))
+    }),
+    ("torus", |size| {
+        let n = sized("torus", size.unwrap_or(40), 3, 2500)?;
+        Ok(around("torus", soup::torus(2 * n, n, 0.4)))
+    }),
+    ("rubble", rubble),
+];
+
+/// `n` triangles by `make`, 10 000 where no number is given, seen from outside.
+fn triangles(
+    name: &'static str,
+    n: Option<u32>,
+    make: impl Fn(u32) -> TriangleMesh,
+) -> Result<Scene, SceneError> {
+    Ok(around(name, make(sized(name, n.unwrap_or(10_000), 0, soup::MOST)?)))
+}
+
+/// A mesh in the default look, and a view of all of it.
+fn around(name: &str, mesh: TriangleMesh) -> Scene {
+    let view = View::framing(&bound(&mesh));
+    framed(name.to_string(), SceneGeometry::Mesh(mesh), view)
+}
+
+/// Geometry in the default look, with one light behind the eye, and a light background.
+pub(crate) fn framed(name: String, geometry: SceneGeometry, view: View) -> Scene {
+    Scene {
+        name,
+        geometry,
+        materials: vec![Material::default()],
+        material_of: Vec::new(),
+        lights: vec![view.key_light()],
+        view,
+        background: [0.9, 0.92, 0.95],
+        warnings: Vec::new(),
+    }
+}
+
+fn rubble(size: Option<u32>) -> Result<Scene, SceneError> {
+    let center = DVec3::new(1e7, -3e6, 2e6);
+    let n = sized("rubble", size.unwrap_or(10_000), 0, 1_000_000)?;
+    // Framed about zero and moved there: a box of `f32` at 1e7 is metres too large.
+    let view = View::framing(&Aabb::new(Vec3A::NEG_ONE, Vec3A::ONE));
+    let view = View { from: center + view.from, at: center + view.at, ..view };
+    Ok(framed("rubble".to_string(), SceneGeometry::FineMesh(fine::rubble(n, center, 1)), view))
+}
 
 /// The names of the scenes [`by_name`] knows.
 pub fn names() -> Vec<&'static str> {
@@ -267,5 +331,51 @@ pub fn by_name(name: &str, size: Option<u32>) -> Result<Scene, SceneError> {
     match SCENES.iter().find(|scene| scene.0 == name) {
         Some((_, make)) => make(size),
         None => Err(SceneError::Unknown { name: name.to_string() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_has_a_name_and_every_name_a_scene() {
+        for name in names() {
+            let size = by_name(name, None).map(|scene| scene.prim_count());
+            assert!(size.is_ok_and(|n| n > 100), "{name}");
+            assert!(by_name(name, Some(u32::MAX)).is_err(), "{name}");
+        }
+        let error = by_name("bunny", None).unwrap_err().to_string();
+        assert!(
+            error.starts_with("there is no scene \"bunny\"; there are balls, tetra, stadium,"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn the_whole_box_is_in_the_picture() {
+        let lying = Aabb::new(Vec3A::ZERO, Vec3A::new(100.0, 80.0, 1.0));
+        let thin = Aabb::new(Vec3A::splat(1e7), Vec3A::new(1e7 + 1.0, 2e7, 1e7));
+        let small = Aabb::new(Vec3A::splat(-1e-38), Vec3A::splat(1e-38));
+        let large = Aabb::new(Vec3A::splat(-3e38), Vec3A::splat(3e38));
+        let point = Aabb::new(Vec3A::ONE, Vec3A::ONE);
+        for bound in [lying, thin, small, large, point, Aabb::EMPTY, Aabb::INFINITE] {
+            let view = View::framing(&bound);
+            assert!(view.from.is_finite() && view.at.is_finite() && view.from != view.at, "{bound:?}");
+            let ahead = (view.at - view.from).normalize();
+            let right = ahead.cross(view.up).normalize();
+            let over = right.cross(ahead);
+            let light = view.key_light().position - view.from;
+            assert!(light.dot(right) < 0.0 && light.dot(over) > 0.0 && light.dot(ahead) < 0.0);
+            if !bound.is_valid() || bound == Aabb::INFINITE {
+                continue;
+            }
+            let (min, max) = (bound.min.as_dvec3(), bound.max.as_dvec3());
+            for corner in [min, max, DVec3::new(min.x, max.y, min.z), DVec3::new(max.x, min.y, max.z)] {
+                let to = corner - view.from;
+                let side = to.dot(right).abs().max(to.dot(over).abs());
+                assert!(to.dot(ahead) > 0.0 && side / to.dot(ahead) < (view.angle / 2.0).tan(), "{bound:?}");
+            }
+        }
     }
 }

@@ -8,6 +8,7 @@ mod balls;
 mod tetra;
 
 pub use balls::balls;
+pub(crate) use balls::balls_of_triangles;
 pub use tetra::tetra;
 
 /// The sky of most SPD scenes.

@@ -3,9 +3,10 @@
 use super::SKY;
 use crate::numbers::turn;
 use crate::scene::sized;
+use crate::soup::{self, Soup};
 use crate::{Light, Material, Scene, SceneError, SceneGeometry, Solid, View};
 use rt_geom::glam::DVec3;
-use rt_shapes::{Polygon, Sphere};
+use rt_shapes::{Polygon, Sphere, TriangleMesh};
 
 /// The sphereflake, `balls`: a ball that wears nine balls of a third its size, each of which wears nine, `size` times; on a
 /// floor.
@@ -43,6 +44,20 @@ pub fn balls(size: u32) -> Result<Scene, SceneError> {
         background: SKY,
         warnings: Vec::new(),
     })
+}
+
+/// The balls as icospheres of 80 triangles, without the floor: a trial for structures.
+pub(crate) fn balls_of_triangles(depth: u32) -> TriangleMesh {
+    let mut solids = Vec::new();
+    flake(&mut solids, &worn(), depth, DVec3::ZERO, 0.5, DVec3::Z);
+    let ball = soup::icosphere(1);
+    let mut soup = Soup::new(80 * solids.len() as u32);
+    for solid in solids {
+        if let Solid::Sphere(s) = solid {
+            (0..80).for_each(|i| soup.push(ball.triangle(i).corners.map(|p| s.center() + p * s.radius())));
+        }
+    }
+    soup.mesh()
 }
 
 /// The directions in which a ball wears others when it is itself worn towards +z: three trios, each of one at the latitude
