@@ -27,7 +27,7 @@ pub(crate) struct Args {
     /// The structure over the scene.
     #[arg(long, value_name = "STRUCTURE", default_value = DEFAULT_STRUCTURE)]
     with: String,
-    /// Where the PNG goes; `-` is stdout. Default: out/<scene>.png.
+    /// Where the PNG goes; `-` is stdout. Default: out/SCENE.png.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Side of the picture in pixels.
