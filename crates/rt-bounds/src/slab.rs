@@ -1,7 +1,7 @@
 //! The slab test: [`SlabRay`] and [`BoxPair`].
 
 use crate::Aabb;
-use rt_geom::glam::{DVec3, Vec4, Vec4Swizzles};
+use rt_geom::glam::{DVec3, Vec3A, Vec4, Vec4Swizzles};
 use rt_geom::{Axis, Ray, Real, Vector, f32_above, f32_below};
 
 /// Beyond this size a coordinate of the ray's origin says nothing: that axis then never rejects.
@@ -75,8 +75,54 @@ impl SlabRay {
     /// Prepares `ray` for boxes given relative to `origin` that all lie in `world`, itself relative to `origin`.
     ///
     /// The ray must be [valid](Ray::is_valid); `world` matters only to rays with a negative `t_min`.
-    #[inline]
+    #[inline(always)]
     pub fn new<R: Real>(ray: &Ray<R>, origin: DVec3, world: &Aabb) -> SlabRay {
+        match (ray.origin.as_f32(), ray.dir.as_f32()) {
+            (Some(o), Some(d)) if origin == DVec3::ZERO => {
+                Self::plain(ray, o, d).unwrap_or_else(|| Self::general(ray, origin, world))
+            }
+            _ => Self::general(ray, origin, world),
+        }
+    }
+
+    /// The short way, in `f32` lanes, for an `f32` ray with `t_min >= 0` whose components are neither zero nor extreme. It
+    /// yields what the general way yields, or a little more slack.
+    #[inline(always)]
+    fn plain<R: Real>(ray: &Ray<R>, o: Vec3A, d: Vec3A) -> Option<SlabRay> {
+        let size = d.abs();
+        let exponent = (size.max_element().to_bits() >> 23) as i32 - 127;
+        let unit = f32::from_bits(((exponent.clamp(-100, 100) + 127) as u32) << 23);
+        let inverse_unit = f32::from_bits(((127 - exponent.clamp(-100, 100)) as u32) << 23);
+        let dir = d * inverse_unit;
+        let steep = dir.abs().cmpge(Vec3A::splat(1.0 / (1u64 << 60) as f32)).all();
+        let near_zero = o.abs().cmple(Vec3A::splat(FAR as f32)).all();
+        let forward = ray.t_min >= R::ZERO;
+        if !(steep && near_zero && forward && (-100..=100).contains(&exponent)) {
+            return None;
+        }
+        let r = dir.recip();
+        let near = r * (1.0 - SLACK as f32);
+        let far = r * -(1.0 + SLACK as f32);
+        // Lost in rounding unless the origin is tiny.
+        let step = Vec3A::splat(STEP as f32).copysign(r);
+        let (ahead, behind) = (o + step, o - step);
+        let lanes = |near: f32, far: f32| Vec4::new(near, near, far, far);
+        let t_min: f64 = ray.t_min.into();
+        let mut slab = SlabRay {
+            origin: [lanes(ahead.x, behind.x), lanes(ahead.y, behind.y), lanes(ahead.z, behind.z)],
+            inverse: [lanes(near.x, far.x), lanes(near.y, far.y), lanes(near.z, far.z)],
+            negative: [r.x < 0.0, r.y < 0.0, r.z < 0.0],
+            start: 0.0,
+            unit: unit as f64,
+            near: (t_min * unit as f64) as f32 * (1.0 - SLACK as f32),
+            far: 0.0,
+        };
+        slab.shorten(ray.t_max);
+        Some(slab)
+    }
+
+    #[cold]
+    fn general<R: Real>(ray: &Ray<R>, origin: DVec3, world: &Aabb) -> SlabRay {
         let (o, d) = (ray.origin.widen(), ray.dir.widen());
         // A power of two that brings the largest component into [1, 2): the reciprocal then never underflows. Its exponent
         // is clamped so that it and its inverse are normal; beyond, the reciprocal saturates, outward.

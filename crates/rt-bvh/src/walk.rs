@@ -1,13 +1,14 @@
 //! The traversal: near child first, far child on the stack.
 
 use crate::node::{Bvh, Child, MAX_DEPTH};
+use arrayvec::ArrayVec;
 use core::ops::ControlFlow;
 use rt_accel::{Leaf, Visitor};
 use rt_bounds::{Aabb, SlabRay};
 use rt_geom::{Ray, Real};
 
-/// A power of two, so that an index is masked rather than checked; a walk pushes at most one child a level.
-const STACK: usize = MAX_DEPTH.next_power_of_two();
+/// A walk pushes at most one child a level; a stack that is full stays so, and never is.
+type Stack<T> = ArrayVec<T, { MAX_DEPTH + 1 }>;
 
 impl Bvh {
     #[inline(always)]
@@ -22,8 +23,7 @@ impl Bvh {
             return;
         }
         let mut slab = SlabRay::new(ray, self.origin, &self.bound);
-        let mut stack = [(Child { index: 0, count: 0 }, 0.0f32); STACK];
-        let mut top = 0;
+        let mut stack = Stack::<(Child, f32)>::new();
         let mut at = Child::node(0);
         loop {
             if at.is_leaf() {
@@ -43,19 +43,14 @@ impl Bvh {
                     let near = if met == 3 { (entry[1] < entry[0]) as usize } else { (met >> 1) as usize };
                     at = node.child(near);
                     if met == 3 {
-                        stack[top % STACK] = (node.child(1 - near), entry[1 - near]);
-                        top += 1;
+                        let _ = stack.try_push((node.child(1 - near), entry[1 - near]));
                     }
                     continue;
                 }
             }
             // Pop what is not beyond the closest hit so far.
             loop {
-                if top == 0 {
-                    return;
-                }
-                top -= 1;
-                let (child, entry) = stack[top % STACK];
+                let Some((child, entry)) = stack.pop() else { return };
                 if ANY || entry <= slab.far() {
                     at = child;
                     break;
@@ -69,11 +64,10 @@ impl Bvh {
         if self.nodes.is_empty() || !keep(&out(&self.bound)) {
             return;
         }
-        let mut stack = [0u32; STACK + 1];
-        let mut top = 1;
-        while top > 0 {
-            top -= 1;
-            let node = &self.nodes[stack[top] as usize];
+        let mut stack = Stack::<u32>::new();
+        stack.push(0);
+        while let Some(index) = stack.pop() {
+            let node = &self.nodes[index as usize];
             let boxes = node.boxes();
             // The right child is pushed first, so that the left comes first.
             let mut inner = [None; 2];
@@ -88,8 +82,7 @@ impl Bvh {
                 }
             }
             for index in inner.into_iter().flatten() {
-                stack[top] = index;
-                top += 1;
+                let _ = stack.try_push(index);
             }
         }
     }

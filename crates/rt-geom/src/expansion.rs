@@ -205,6 +205,18 @@ impl<const N: usize> Expansion<N> {
     pub fn value(&self) -> f64 {
         self.parts[..self.len].iter().sum()
     }
+
+    /// The value with twice the digits of `f64`.
+    pub fn rounded(&self) -> DoubleDouble {
+        let mut rest = 0.0;
+        let mut sum = 0.0;
+        for &part in &self.parts[..self.len] {
+            let (s, e) = two_sum(sum, part);
+            // Least first: what the sum loses now is larger than all it lost before.
+            (sum, rest) = (s, rest + e);
+        }
+        DoubleDouble::normal(sum, rest)
+    }
 }
 
 /// A number kept as an unevaluated sum of two `f64`: some 106 bits.
@@ -264,6 +276,16 @@ impl core::ops::Sub for DoubleDouble {
     #[inline(always)]
     fn sub(self, b: DoubleDouble) -> DoubleDouble {
         self + DoubleDouble { hi: -b.hi, lo: -b.lo }
+    }
+}
+
+impl core::ops::Div for DoubleDouble {
+    type Output = DoubleDouble;
+    #[inline(always)]
+    fn div(self, b: DoubleDouble) -> DoubleDouble {
+        let first = self.hi / b.hi;
+        let rest = self - b * DoubleDouble::from(first);
+        DoubleDouble::normal(first, rest.hi / b.hi)
     }
 }
 
@@ -335,6 +357,11 @@ mod tests {
             let product = x * y;
             let rest: Expansion<10> = exact.minus(&Expansion::<2>::difference(product.hi, -product.lo));
             prop_assert!(rest.value().abs() <= exact.value().abs() * (2f64).powi(-102));
+            if ey.sign() != 0 {
+                let back = (product / y - x).value();
+                prop_assert!(back.abs() <= x.value().abs() * (2f64).powi(-98), "{back:e}");
+            }
+            prop_assert!((exact.rounded() - product).value().abs() <= product.value().abs() * (2f64).powi(-100));
             let exact: Expansion<4> = ex.plus(&ey);
             let sum = x + y;
             let rest: Expansion<6> = exact.minus(&Expansion::<2>::difference(sum.hi, -sum.lo));

@@ -63,7 +63,8 @@ impl<R: Real> Ray<R> {
     pub fn admit(&self, t: f64) -> Option<R> {
         let rounded = R::nearest(t);
         let rounded = if rounded > R::MAX { R::MAX } else { rounded };
-        (t >= self.t_min.into() && rounded <= self.t_max).then_some(rounded)
+        let rounded = if rounded < -R::MAX { -R::MAX } else { rounded };
+        (t >= self.t_min.into() && self.contains(rounded)).then_some(rounded)
     }
 
     /// The same ray in `f64`, exactly.
@@ -93,6 +94,20 @@ mod tests {
     #[test]
     fn a_ray_of_f32_is_48_bytes() {
         assert_eq!(size_of::<Ray>(), 48);
+    }
+
+    #[test]
+    fn admitted_roots_are_finite_and_in_the_interval() {
+        let ray = Ray::new(Vec3A::ZERO, Vec3A::X);
+        assert_eq!(ray.admit(1e300), Some(f32::MAX));
+        assert_eq!(ray.admit(f64::INFINITY), Some(f32::MAX));
+        assert_eq!(ray.admit(-1e-300), None);
+        assert_eq!(ray.admit(f64::NAN), None);
+        assert_eq!(ray.between(f32::INFINITY, f32::INFINITY).admit(f64::INFINITY), None);
+        assert_eq!(ray.between(f32::NEG_INFINITY, 0.0).admit(-1e300), Some(f32::MIN));
+        // Compared before rounding at the near end, after rounding at the far end.
+        assert_eq!(ray.between(1.0, 2.0).admit(1.0 - 1e-12), None);
+        assert_eq!(ray.between(1.0, 2.0).admit(2.0 + 1e-12), Some(2.0));
     }
 
     #[test]

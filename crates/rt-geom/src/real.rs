@@ -39,8 +39,8 @@ pub trait Real:
     const INFINITY: Self;
     /// The greatest finite number.
     const MAX: Self;
-    /// The relative error that a root computed in `f64` may have and still round to within one unit in the last place
-    /// of this precision. A root that is worse is computed again with more digits.
+    /// The relative error that a root may have before it is rounded to this precision: a small part of a unit in the last
+    /// place. A root that may be worse is computed again with more digits; in `f64`, that is every root.
     const ROOT_ERROR: f64;
 
     /// The nearest number of this precision, ties to even.
@@ -75,6 +75,8 @@ pub trait Vector:
     fn widen(self) -> DVec3;
     /// The nearest vector of this precision, component by component.
     fn nearest(v: DVec3) -> Self;
+    /// The vector itself if this is the narrow precision: for shorter ways that only `f32` can take.
+    fn as_f32(self) -> Option<Vec3A>;
 }
 
 impl Real for f32 {
@@ -90,9 +92,12 @@ impl Real for f32 {
     }
     #[inline]
     fn reach(self) -> f64 {
-        if !(self < f32::MAX) {
+        if self == f32::MAX {
             // The last numbers before infinity round to MAX.
-            return if self == f32::MAX { f64::from_bits(0x47ef_ffff_efff_ffff) } else { self as f64 };
+            return f64::from_bits(0x47ef_ffff_efff_ffff);
+        }
+        if self == f32::INFINITY {
+            return f64::INFINITY;
         }
         let middle = (self as f64 + self.next_up() as f64) * 0.5;
         if middle as f32 <= self { middle } else { middle.next_down() }
@@ -116,7 +121,7 @@ impl Real for f64 {
     const ZERO: f64 = 0.0;
     const INFINITY: f64 = f64::INFINITY;
     const MAX: f64 = f64::MAX;
-    const ROOT_ERROR: f64 = f64::EPSILON;
+    const ROOT_ERROR: f64 = f64::EPSILON / 8.0;
 
     #[inline(always)]
     fn nearest(x: f64) -> f64 {
@@ -150,6 +155,10 @@ impl Vector for Vec3A {
     fn nearest(v: DVec3) -> Vec3A {
         v.as_vec3a()
     }
+    #[inline(always)]
+    fn as_f32(self) -> Option<Vec3A> {
+        Some(self)
+    }
 }
 
 impl Vector for DVec3 {
@@ -161,6 +170,10 @@ impl Vector for DVec3 {
     #[inline(always)]
     fn nearest(v: DVec3) -> DVec3 {
         v
+    }
+    #[inline(always)]
+    fn as_f32(self) -> Option<Vec3A> {
+        None
     }
 }
 
