@@ -136,7 +136,7 @@ impl core::error::Error for ObjError {}
 /// Reads the OBJ file at `path`, and the material libraries it names from the same folder.
 ///
 /// The scene has a view of the whole mesh, from above, with one light. What was passed over stands in its
-/// [`warnings`](Scene::warnings). A million triangles take two or three seconds.
+/// [`warnings`](Scene::warnings). A million triangles take about two seconds.
 ///
 /// # Errors
 ///
@@ -189,6 +189,10 @@ fn parse(bytes: &[u8], name: &str, folder: Option<&Path>) -> Result<Scene, ObjEr
     let (mut vertices, mut triangles) = (Vec::<[f32; 3]>::new(), Vec::new());
     let (mut normals, mut uvs, mut material_of) = (Vec::new(), Vec::new(), Vec::new());
     for tobj::Model { mesh, .. } in models {
+        let len = vertices.len() + mesh.positions.len() / 3;
+        if u32::try_from(len).is_err() {
+            return Err(fail(None, ObjProblem::Mesh(MeshError::TooManyTriangles { len })));
+        }
         let first = vertices.len() as u32;
         vertices.extend(mesh.positions.as_chunks::<3>().0);
         normals.extend(mesh.normals.as_chunks::<3>().0);

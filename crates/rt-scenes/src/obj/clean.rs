@@ -117,6 +117,8 @@ impl Reader {
     fn vertex<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Result<(), ObjProblem> {
         let mut at = [0.0f32; 4];
         let mut found = 0;
+        let start = self.out.text.len();
+        self.out.text.push('v');
         for word in words {
             let value = parsed(word)?;
             if let Some(slot) = at.get_mut(found) {
@@ -124,12 +126,14 @@ impl Reader {
             }
             if found < 3 {
                 self.coordinate(word, value)?;
+                self.out.text.push(' ');
+                self.out.text.push_str(word);
             }
             found += 1;
         }
         match found {
             // With a colour, or without.
-            3 | 6 => self.write("v", &at[..3]),
+            3 | 6 => self.out.text.push('\n'),
             // With a weight; and a colour.
             4 | 7 => {
                 let [x, y, z, w] = at;
@@ -140,6 +144,7 @@ impl Reader {
                 for value in divided {
                     self.coordinate(&format!("{value}"), value)?;
                 }
+                self.out.text.truncate(start);
                 self.write("v", &divided);
             }
             _ => {
