@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(sum, SUM, "{sum:#x}");
     }
 
-    const SUM: u64 = 11394296862657644912;
+    const SUM: u64 = 0x4617_e16f_2d66_8867;
 
     #[test]
     fn closed_is_closed() {
