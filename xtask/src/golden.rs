@@ -37,6 +37,10 @@ fn size(scene: &str) -> Option<u32> {
     match scene {
         "balls" => Some(2),
         "tetra" => Some(4),
+        "stadium" => Some(2),
+        "soup" | "clusters" | "sticks" | "needles" | "rubble" => Some(1000),
+        "icosphere" | "crumpled" => Some(3),
+        "torus" => Some(20),
         _ => None,
     }
 }

@@ -10,8 +10,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// A shape whose structure is forgotten: rays come in batches, so that the virtual call costs nothing, and the renderer is
-/// compiled once and not for each structure.
+/// A shape whose structure is forgotten, so that the renderer is compiled once and not for each structure. Rays come in
+/// batches, one virtual call each: balls took as long either way (medians of 15 turns each: 499 ms and 500 ms).
 pub(crate) type AnyShape<R, A> = Box<dyn Shape<R, At = A>>;
 
 /// The shapes of a scene: of solids, or of a mesh.
