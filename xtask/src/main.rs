@@ -11,6 +11,7 @@ mod failure;
 mod golden;
 mod output;
 mod render;
+mod stability;
 mod stage;
 mod structures;
 mod tidy;
@@ -30,6 +31,7 @@ const EXAMPLES: &str = "\
 Examples:
   cargo xtask render                    a picture of balls in out/balls.png
   cargo xtask render tetra --explain    another scene, and what it leaves out
+  cargo xtask stability --rays 10000000 stiff and extreme cases against exact arithmetic
   cargo xtask golden                    has any reference picture changed?
   cargo xtask ci                        everything a server checks
 
@@ -41,6 +43,8 @@ enum Task {
     Render(render::Args),
     /// Compare small pictures of every structure with the reference ones, bit for bit.
     Golden(golden::Args),
+    /// Ask about stiff and extreme cases, and judge by exact arithmetic.
+    Stability(stability::Args),
     /// Check the rules of the house that no compiler knows.
     Tidy(tidy::Args),
     /// Everything a server checks: format, lints, docs, tidy, golden, features one by one.
@@ -51,6 +55,7 @@ fn main() -> ExitCode {
     let result = match Args::parse().task {
         Task::Render(args) => render::run(&args),
         Task::Golden(args) => golden::run(&args),
+        Task::Stability(args) => stability::run(&args),
         Task::Tidy(args) => tidy::run(&args),
         Task::Ci(args) => ci::run(&args),
     };

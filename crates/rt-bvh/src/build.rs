@@ -277,7 +277,7 @@ impl Splitter<'_> {
             Some((cost, plane)) => {
                 let cost =
                     self.params.sah.traverse as f64 * area(bound) + self.params.sah.intersect as f64 * cost;
-                if len <= leaf_prims && !(cost < leaf_cost) {
+                if len <= leaf_prims && cost >= leaf_cost {
                     return None;
                 }
                 let middle = partition(refs, |r| plane.left(r));

@@ -246,6 +246,16 @@ impl DoubleDouble {
         self.hi + self.lo
     }
 
+    /// The square root; NaN below zero.
+    pub fn sqrt(self) -> DoubleDouble {
+        let first = self.hi.sqrt();
+        if first == 0.0 {
+            return DoubleDouble::from(0.0);
+        }
+        let rest = self - DoubleDouble::from(first) * DoubleDouble::from(first);
+        DoubleDouble::normal(first, rest.hi / (2.0 * first))
+    }
+
     #[inline(always)]
     fn normal(hi: f64, lo: f64) -> DoubleDouble {
         let sum = hi + lo;
@@ -361,6 +371,8 @@ mod tests {
                 let back = (product / y - x).value();
                 prop_assert!(back.abs() <= x.value().abs() * (2f64).powi(-98), "{back:e}");
             }
+            let root = (product * product).sqrt().value();
+            prop_assert!((root - product.value().abs()).abs() <= product.value().abs() * f64::EPSILON);
             prop_assert!((exact.rounded() - product).value().abs() <= product.value().abs() * (2f64).powi(-100));
             let exact: Expansion<4> = ex.plus(&ey);
             let sum = x + y;

@@ -106,12 +106,19 @@ impl AddAssign for HitError {
 }
 
 /// How far `t` is from the exact number, in units in the last place: the distance from the exact number, rounded, to the next
-/// number away from zero. Infinite when `t` is not finite.
+/// number away from zero. Infinite when `t` is not finite. Zero for the greatest number where the exact one is beyond the range.
 pub fn ulps<R: Real>(exact: &Rational, t: R) -> f64 {
     let Some(found) = Rational::from_f64(t.into()) else { return f64::INFINITY };
     let rounded = exact.nearest::<R>();
     let size = if rounded < R::ZERO { -rounded } else { rounded };
-    let size = if size > R::MAX { R::MAX } else { size };
+    if size > R::MAX {
+        // Beyond the range the contract asks for the greatest number.
+        return if t == R::MAX && R::ZERO < rounded || t == -R::MAX && rounded < R::ZERO {
+            0.0
+        } else {
+            f64::INFINITY
+        };
+    }
     let next: f64 = size.next_up().into();
     let size: f64 = size.into();
     // The greatest number has no next one, but a last place all the same.

@@ -10,6 +10,8 @@ use rt_geom::glam::{DVec2, DVec3};
 use rt_geom::{Ray, Real, Vector, gamma};
 
 const U: f64 = f64::EPSILON / 2.0;
+/// A Newton step this small leaves an error of its square: less than a rounding.
+const POLISHED: f64 = 1e-10;
 
 /// A full sphere in world space, kept in `f64`; answers rays of both precisions.
 ///
@@ -109,19 +111,29 @@ impl Sphere {
         self.roots_exact(o, d)
     }
 
-    /// One Newton step on the residual `|o + t d - c|^2 - r^2`, evaluated with twice the digits.
+    /// Newton steps on the residual `|o + t d - c|^2 - r^2`, evaluated with twice the digits, until they no longer matter:
+    /// one for most rays, a second for `f64` near tangency.
     #[inline]
-    fn polish(&self, o: DVec3, d: DVec3, t: f64) -> f64 {
+    fn polish(&self, o: DVec3, d: DVec3, mut t: f64) -> f64 {
         let r = DoubleDouble::from(self.radius);
-        let mut residual = DoubleDouble::from(0.0) - r * r;
-        let mut slope = 0.0;
-        for i in 0..3 {
-            let p = DoubleDouble::difference(o[i], self.center[i]) + DoubleDouble::from(t) * d[i].into();
-            residual = residual + p * p;
-            slope += p.value() * d[i];
+        for _ in 0..3 {
+            let mut residual = DoubleDouble::from(0.0) - r * r;
+            let mut slope = 0.0;
+            for i in 0..3 {
+                let p = DoubleDouble::difference(o[i], self.center[i]) + DoubleDouble::from(t) * d[i].into();
+                residual = residual + p * p;
+                slope += p.value() * d[i];
+            }
+            let step = residual.value() / (2.0 * slope);
+            if !step.is_finite() {
+                break;
+            }
+            t -= step;
+            if step.abs() <= t.abs() * POLISHED {
+                break;
+            }
         }
-        let step = residual.value() / (2.0 * slope);
-        if step.is_finite() { t - step } else { t }
+        t
     }
 
     /// The roots from the exact discriminant, for lines so close to tangent that rounding leaves the decision open.
@@ -147,13 +159,14 @@ impl Sphere {
         if discriminant.sign() < 0 {
             return None;
         }
-        let (a, b, root) = (a.value(), b.value(), discriminant.value().sqrt());
+        let (a, b, root) = (a.rounded(), b.rounded(), discriminant.rounded().sqrt());
+        let zero = DoubleDouble::from(0.0);
         // The root that does not cancel first, the other by division.
-        let q = -(b + root.copysign(b));
-        if q == 0.0 {
+        let q = if b.value() < 0.0 { root - b } else { zero - b - root };
+        if q.value() == 0.0 {
             return Some([0.0, 0.0]);
         }
-        let (near, far) = (q / a, c.value() / q);
+        let (near, far) = ((q / a).value(), (c.rounded() / q).value());
         Some([near.min(far), near.max(far)])
     }
 }
