@@ -4,6 +4,8 @@ use crate::{Camera, RayCounts, Whitted};
 use core::fmt;
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use image::codecs::png::PngEncoder;
+use image::{DynamicImage, ExtendedColorType, ImageEncoder, ImageFormat};
 use rt_accel::Counts;
 use rt_geom::glam::{DVec3, Vec3};
 use rt_geom::{Ray, Real};
@@ -280,15 +282,11 @@ impl Picture {
         if self.pixels.len() != self.width as usize * self.height as usize {
             return Err(PngError("the number of pixels is not width times height".into()));
         }
-        let encode = || {
-            let mut file = Vec::new();
-            let mut encoder = png::Encoder::new(&mut file, self.width, self.height);
-            encoder.set_color(png::ColorType::Rgb);
-            encoder.set_depth(png::BitDepth::Eight);
-            encoder.write_header()?.write_image_data(&self.bytes())?;
-            Ok(file)
-        };
-        encode().map_err(|e: png::EncodingError| PngError(e.to_string()))
+        let mut file = Vec::new();
+        PngEncoder::new(&mut file)
+            .write_image(&self.bytes(), self.width, self.height, ExtendedColorType::Rgb8)
+            .map_err(|e| PngError(e.to_string()))?;
+        Ok(file)
     }
 
     /// The picture in a PNG file of eight-bit red, green and blue, as [`Picture::png`] makes them.
@@ -297,17 +295,13 @@ impl Picture {
     ///
     /// When the bytes are no PNG file, or one of other colours.
     pub fn from_png(file: &[u8]) -> Result<Picture, PngError> {
-        let error = |e: png::DecodingError| PngError(e.to_string());
-        let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().map_err(error)?;
-        if reader.output_color_type() != (png::ColorType::Rgb, png::BitDepth::Eight) {
+        let image = image::load_from_memory_with_format(file, ImageFormat::Png)
+            .map_err(|e| PngError(e.to_string()))?;
+        let DynamicImage::ImageRgb8(image) = image else {
             return Err(PngError("its colours are not eight-bit red, green and blue".into()));
-        }
-        let size = reader.output_buffer_size().ok_or_else(|| PngError("it is too large".into()))?;
-        let mut bytes = vec![0; size];
-        let frame = reader.next_frame(&mut bytes).map_err(error)?;
-        let pixels =
-            bytes.chunks_exact(3).map(|c| [c[0], c[1], c[2]].map(|c| f32::from(c) / 255.0)).collect();
-        Ok(Picture { width: frame.width, height: frame.height, pixels })
+        };
+        let pixels = image.pixels().map(|p| p.0.map(|c| f32::from(c) / 255.0)).collect();
+        Ok(Picture { width: image.width(), height: image.height(), pixels })
     }
 }
 

@@ -194,13 +194,13 @@ impl View {
         View { from: at + toward * distance, at, up, angle }
     }
 
-    /// A light at the upper left behind the eye, and as far from what is seen again as the eye.
+    /// A light at the upper left behind the eye, and as far from what is seen again as the eye; as strong as SPD asks of one.
     pub(crate) fn key_light(&self) -> Light {
         let back = self.from - self.at;
         let right = self.up.cross(back).normalize_or_zero();
         let over = back.cross(right).normalize_or_zero();
         let position = self.at + back * 1.5 + (over - right) * back.length();
-        Light { position, color: [1.0; 3] }
+        Light { position, color: [0.5; 3] }
     }
 }
 
