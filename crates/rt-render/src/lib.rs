@@ -49,3 +49,8 @@ pub use camera::{Camera, CameraError};
 pub use film::{Cancelled, Film, Governor, Picture, PngError, Tile, ungoverned};
 pub use heat::{Measure, Scale, heat};
 pub use whitted::{Look, Plan, RayCounts, Whitted};
+
+/// The code of the workspace's front page, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct FrontPage;
