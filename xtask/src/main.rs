@@ -6,6 +6,7 @@
 // The one place of the workspace that talks to people.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod bench;
 mod ci;
 mod failure;
 mod golden;
@@ -32,6 +33,7 @@ Examples:
   cargo xtask render                    a picture of balls in out/balls.png
   cargo xtask render tetra --explain    another scene, and what it leaves out
   cargo xtask stability --rays 10000000 stiff and extreme cases against exact arithmetic
+  cargo xtask bench --quick             what rays cost, in less than two minutes
   cargo xtask golden                    has any reference picture changed?
   cargo xtask ci                        everything a server checks
 
@@ -43,6 +45,8 @@ enum Task {
     Render(render::Args),
     /// Compare small pictures of every structure with the reference ones, bit for bit.
     Golden(golden::Args),
+    /// Measure what rays cost, and how wrong the answers are.
+    Bench(bench::Args),
     /// Ask about stiff and extreme cases, and judge by exact arithmetic.
     Stability(stability::Args),
     /// Check the rules of the house that no compiler knows.
@@ -55,6 +59,7 @@ fn main() -> ExitCode {
     let result = match Args::parse().task {
         Task::Render(args) => render::run(&args),
         Task::Golden(args) => golden::run(&args),
+        Task::Bench(args) => bench::run(&args),
         Task::Stability(args) => stability::run(&args),
         Task::Tidy(args) => tidy::run(&args),
         Task::Ci(args) => ci::run(&args),

@@ -39,7 +39,8 @@ const LAYERS: &[(u8, &[&str])] = &[
     (3, &["rt-shapes", "rt-grid", "rt-kdtree", "rt-octree", "rt-bsp", "rt-bvh", "rt-direction"]),
     (4, &["rt-scenes", "rt-measure"]),
     (5, &["rt-render"]),
-    (6, &["rt-bench", "xtask"]),
+    (6, &["rt-bench"]),
+    (7, &["xtask"]),
 ];
 
 /// The highest layer that tests of lower ones may use.
