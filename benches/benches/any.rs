@@ -3,7 +3,9 @@
 //! On a soup of 10 000 triangles, by the kind of rays; exact in `f32` and `f64`, and by the fast triangle test, which errs.
 //! Larger scenes, and the errors beside the times, are in the records of `cargo xtask bench any`.
 //!
-//! Not answered yet.
+//! Answer: 0.6 to 0.8 microseconds on a scanned mesh of 69 451 triangles, 2.3 to 2.7 on a soup of 100 000, `f32`, exact. The
+//! fast test is 1.10 times as fast over six meshes, `f64` rays 0.81 times over seven scenes, on a machine where one cell may
+//! be off by a sixth. (The record of 2026-11-22, AMD EPYC, two cores.)
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rt_accel::{Aggregate, Primitive};

@@ -3,7 +3,11 @@
 //! By the number of bins and the size of leaves, over a soup of 10 000 triangles. What each knob does to rays is in the records
 //! of `cargo xtask bench build`.
 //!
-//! Not answered yet.
+//! Answer: 0.6 to 0.85 microseconds a triangle, on one thread. Of the knobs sweeping costs most: splitting small ranges by
+//! bins alone takes 1.46 times as long, sweeping up to 64 primitives instead of 24 takes 1.16 times; 8 bins take 0.95, 64
+//! bins 1.09. None of these changed rays by more than the noise, which is 2 per cent here. Leaves of one primitive slow rays
+//! down, by 11 per cent, and 4, 8 or 16 lead to the same trees almost everywhere. (The record of 2026-11-22, AMD EPYC, two
+//! cores: geometric means over five scenes.)
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rt_accel::Structure;

@@ -3,7 +3,10 @@
 //! One ray against 512 boxes, and what it costs to make a ray ready. The errors of each test, on rays in faces, along axes and
 //! through corners, are in the records of `cargo xtask bench slab`.
 //!
-//! Not answered yet.
+//! Answer: the pair, of `SlabRay`. A box costs it 1.1 ns, a single box 2.6 ns, the textbook's test 3.5 ns; it never missed a
+//! box in 98 304 judged tests, while the textbook's lost 46 % of the rays in faces, 35 % of those along axes, 18 % of those
+//! through corners (9 % where its exit is padded). Making a ray ready costs 28 ns against 24. (The record of 2026-11-22, AMD
+//! EPYC, two cores; the last from this program.)
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rt_bench::TextbookRay;

@@ -1,4 +1,7 @@
 //! What does each knob of a build buy, in build time and in time a ray?
+//!
+//! Values that lead to the same tree, as large leaves do wherever the surface area heuristic prefers small ones, are timed
+//! all the same: what they differ by is noise, and no difference below it means anything.
 
 use crate::contest::{Borrowed, Contestant, Group, Label, Named, Weigh, build_all, contest, ours};
 use crate::judge::Judge;

@@ -7,7 +7,7 @@ use rt_bvh::{Bvh, BvhParams};
 use rt_geom::Ray;
 use rt_geom::glam::DVec3;
 use rt_measure::rays::{self, Pinhole, Seeded};
-use rt_scenes::{Scene, SceneGeometry, Solid, View, soup};
+use rt_scenes::{Scene, SceneError, SceneGeometry, Solid, View, soup};
 use rt_shapes::{Shape, Surface, Surfaced, TriangleMesh};
 
 /// What there is to hit.
@@ -63,7 +63,12 @@ impl Subject {
             Some((scene, Ok(size))) => (scene, Some(size)),
             _ => (name, None),
         };
-        let made = rt_scenes::by_name(scene, size).map_err(|error| Trouble::Scene(error.to_string()))?;
+        let made = rt_scenes::by_name(scene, size).map_err(|error| {
+            Trouble::Scene(match error {
+                SceneError::Unknown { .. } => format!("{error}, blob"),
+                error => error.to_string(),
+            })
+        })?;
         Subject::new(name, made)
     }
 
