@@ -1,7 +1,7 @@
 //! `cargo xtask bench`: what rays cost, and how wrong they are.
 
 use crate::failure::Failure;
-use crate::output::{Json, Progress, catch_interrupts, root, thousands, write_whole};
+use crate::output::{Json, Progress, catch_interrupts, root, say, thousands, write_whole};
 use clap::ValueEnum;
 use rt_bench::{Effort, Group, Measured, Options, Question, Stamp, Subject, Trouble, ask};
 use rt_measure::record::{HEADER, Row, parse};
@@ -136,12 +136,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             .map_err(|trouble| failure(question, &trouble))?;
         drop(progress);
         if args.format == Format::Text {
-            print!("{}", text(question, &groups));
+            say!("{}", text(question, &groups).trim_end_matches('\n'));
         }
         answers.push((question, groups));
     }
     if args.format == Format::Json {
-        println!("{}", json(&stamp, args.threads, &answers));
+        say!("{}", json(&stamp, args.threads, &answers));
     }
     let broken = answers.iter().flat_map(|(_, groups)| groups).filter(|group| group.outcome.is_err()).count();
     if broken > 0 {

@@ -1,7 +1,7 @@
 //! `cargo xtask ci`: everything a server checks, but for the tests.
 
 use crate::failure::Failure;
-use crate::output::root;
+use crate::output::{root, say};
 use crate::{golden, tidy};
 use std::ffi::OsString;
 use std::process::Command;
@@ -70,7 +70,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
     }
     for (name, time, ok) in times {
-        println!("{} {:7.1} s  {name}", if ok { "ok  " } else { "FAIL" }, time.as_secs_f64());
+        say!("{} {:7.1} s  {name}", if ok { "ok  " } else { "FAIL" }, time.as_secs_f64());
     }
     if failed.is_empty() { Ok(()) } else { Err(Failure::Check(format!("failed: {}", failed.join(", ")))) }
 }

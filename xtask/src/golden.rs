@@ -1,7 +1,7 @@
 //! `cargo xtask golden`: has any picture changed?
 
 use crate::failure::Failure;
-use crate::output::{root, write_whole};
+use crate::output::{root, say, write_whole};
 use crate::stage::{Precision, Stage, load};
 use crate::structures;
 use rt_render::{Camera, Film, Picture, ungoverned};
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         for name in rt_scenes::names() {
             let path = folder.join(format!("{name}.png"));
             write_whole(&path, &png(&draw(name, "exhaustive")?)?)?;
-            println!("blessed {}", path.display());
+            say!("blessed {}", path.display());
         }
     }
     let one = args.with.as_deref();
@@ -68,9 +68,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     for name in rt_scenes::names() {
         for structure in &chosen {
             match compare(name, structure, &folder)? {
-                None => println!("ok      {name} {structure}"),
+                None => say!("ok      {name} {structure}"),
                 Some(why) => {
-                    println!("differs {name} {structure}: {why}");
+                    say!("differs {name} {structure}: {why}");
                     wrong.push(format!("{name} {structure}"));
                 }
             }

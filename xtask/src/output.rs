@@ -16,14 +16,46 @@ pub(crate) fn root() -> PathBuf {
     PathBuf::from(here).parent().map_or_else(PathBuf::new, Path::to_path_buf)
 }
 
-/// Writes a file under a temporary name beside it and renames it, making its folder.
+/// Prints a line of results to stdout. Whoever read them may have left: that ends the program, quietly and without error.
+macro_rules! say {
+    ($($arg:tt)*) => { $crate::output::line(format_args!($($arg)*)) };
+}
+pub(crate) use say;
+
+/// See [`say`].
+pub(crate) fn line(text: std::fmt::Arguments<'_>) {
+    let mut out = std::io::stdout().lock();
+    if let Err(error) = out.write_fmt(text).and_then(|()| out.write_all(b"\n")) {
+        if error.kind() == std::io::ErrorKind::BrokenPipe {
+            std::process::exit(0);
+        }
+        eprintln!("error: stdout: {error}");
+        std::process::exit(3);
+    }
+}
+
+/// Writes a file under a temporary name beside it and renames it, making its folder. A link is followed; what is no file, such
+/// as a device, is refused; a file that is replaced keeps its permissions.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let linked = std::fs::symlink_metadata(path).is_ok_and(|there| there.is_symlink());
+    let target =
+        if linked { std::fs::canonicalize(path).map_err(|e| Failure::file(path, e))? } else { path.into() };
+    let there = std::fs::metadata(&target).ok();
+    if there.as_ref().is_some_and(|there| !there.is_file()) {
+        return Err(Failure::file(path, "is there and is not a file"));
+    }
+    let path = target.as_path();
     let name = path.file_name().ok_or_else(|| Failure::file(path, "this is not the name of a file"))?;
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder).map_err(|e| Failure::file(folder, e))?;
     let part = folder.join(format!(".{}.{}.part", name.to_string_lossy(), std::process::id()));
     let written = std::fs::File::create(&part)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+        .and_then(|mut file| {
+            if let Some(there) = &there {
+                file.set_permissions(there.permissions())?;
+            }
+            file.write_all(bytes).and_then(|()| file.sync_all())
+        })
         .and_then(|()| std::fs::rename(&part, path));
     written.map_err(|e| {
         // What could not be finished is not left behind; that it cannot be removed either adds nothing to the error.

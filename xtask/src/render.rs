@@ -1,7 +1,7 @@
 //! `cargo xtask render`: a picture, and what it took.
 
 use crate::failure::Failure;
-use crate::output::{Json, Progress, catch_interrupts, interrupted, thousands, write_whole};
+use crate::output::{Json, Progress, catch_interrupts, interrupted, say, thousands, write_whole};
 use crate::stage::{Built, Precision, Stage, load};
 use crate::structures;
 use clap::ValueEnum;
@@ -158,7 +158,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     };
     // The picture has stdout for itself.
     if !to_stdout {
-        print!("{text}");
+        say!("{}", text.trim_end());
     } else if !args.quiet {
         eprint!("{text}");
     }
@@ -180,7 +180,7 @@ fn target(args: &Args) -> Result<PathBuf, Failure> {
         if path.is_dir() {
             return Err(Failure::file(path, "is a folder"));
         }
-        if path.exists() && !args.force {
+        if std::fs::symlink_metadata(path).is_ok() && !args.force {
             return Err(Failure::file(path, "exists; --force overwrites it"));
         }
     }

@@ -1,7 +1,7 @@
 //! `cargo xtask tidy`: the rules of the house that no compiler knows.
 
 use crate::failure::Failure;
-use crate::output::root;
+use crate::output::{root, say};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -20,11 +20,11 @@ Examples:
 pub(crate) fn run(_: &Args) -> Result<(), Failure> {
     let findings = check(&root())?;
     for finding in &findings {
-        println!("{finding}");
+        say!("{finding}");
     }
     match findings.len() {
         0 => {
-            println!("tidy");
+            say!("tidy");
             Ok(())
         }
         n => Err(Failure::Check(format!("{n} breaches of the rules of the house"))),

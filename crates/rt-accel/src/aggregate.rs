@@ -7,6 +7,7 @@ use crate::{
 };
 use core::ops::ControlFlow;
 use rt_bounds::Aabb;
+use rt_geom::expansion::two_sum;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
 use std::collections::HashSet;
@@ -69,7 +70,8 @@ impl<S: Structure, G> Aggregate<S, G> {
 }
 
 impl<S: Refit, G: Bounded> Aggregate<S, G> {
-    /// Changes the geometry, then refits the structure to it. The number of primitives must stay.
+    /// Changes the geometry, then refits the structure to it. Primitives that are added are not found before the next build;
+    /// see [`Refit::refit`].
     pub fn update(&mut self, change: impl FnOnce(&mut G)) {
         change(&mut self.geometry);
         self.structure.refit(&self.geometry);
@@ -86,10 +88,12 @@ impl<S: Structure, G: Bounded> WorldBound for Aggregate<S, G> {
         let shift = origin - self.structure.origin();
         let bound = local.relative_to(shift);
         // The difference of two origins may itself have been rounded.
-        if shift + self.structure.origin() == origin || !local.is_valid() {
+        let own = self.structure.origin();
+        let exact = (0..3).all(|a| two_sum(origin[a], -own[a]).1 == 0.0);
+        if exact || !local.is_valid() {
             return bound;
         }
-        let slack = DVec3::splat((origin.abs() + self.structure.origin().abs()).max_element() * f64::EPSILON);
+        let slack = DVec3::splat((origin.abs() + own.abs()).max_element() * f64::EPSILON);
         Aabb::from_f64(bound.min.as_dvec3() - slack, bound.max.as_dvec3() + slack, DVec3::ZERO)
     }
 }

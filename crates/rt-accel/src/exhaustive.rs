@@ -78,9 +78,7 @@ impl Structure for Exhaustive {
 
 impl Refit for Exhaustive {
     fn refit(&mut self, prims: &dyn Bounded) {
-        self.bound = self
-            .prims
-            .iter()
-            .fold(Aabb::EMPTY, |world, &prim| world.union(prims.bound_from(prim, self.origin)));
+        let bounds = self.prims.iter().map(|&prim| prims.bound_from(prim, self.origin));
+        self.bound = bounds.filter(|b| b.is_valid()).fold(Aabb::EMPTY, Aabb::union);
     }
 }

@@ -6,7 +6,8 @@ use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
 
-/// Numbered primitives with bounds: all a builder may know.
+/// Numbered primitives with bounds: all a builder may know. A number that does not exist has a bound that is not valid, and is
+/// never hit: structures outlive changes to what they were built over.
 pub trait Bounded: Send + Sync {
     /// How many primitives there are; they are numbered from 0.
     fn prim_count(&self) -> usize;
@@ -59,7 +60,7 @@ pub trait Geometry<R: Real = f32>: Bounded {
     }
 
     /// Every hit on `prim`. Where primitives share a boundary that the ray meets exactly, one of them owns the hit by a fixed
-    /// rule, so that the crossings of a closed surface are counted right.
+    /// rule, so that the crossings of a closed surface are counted right; on the rim of an open one that may leave none.
     fn all_hits(
         &self,
         prim: u32,
@@ -128,10 +129,10 @@ impl<P: crate::WorldBound> Bounded for Vec<P> {
         self.len()
     }
     fn bound(&self, prim: u32) -> Aabb {
-        self[prim as usize].world_bound()
+        self.get(prim as usize).map_or(Aabb::EMPTY, |member| member.world_bound())
     }
     fn bound_from(&self, prim: u32, origin: DVec3) -> Aabb {
-        self[prim as usize].world_bound_from(origin)
+        self.get(prim as usize).map_or(Aabb::EMPTY, |member| member.world_bound_from(origin))
     }
 }
 
@@ -140,11 +141,11 @@ impl<R: Real, P: Primitive<R>> Geometry<R> for Vec<P> {
 
     #[inline]
     fn intersect(&self, prim: u32, ray: &Ray<R>) -> Option<Hit<Self::At, R>> {
-        member(prim, self[prim as usize].intersect(ray))
+        member(prim, self.get(prim as usize)?.intersect(ray))
     }
     #[inline]
     fn intersect_p(&self, prim: u32, ray: &Ray<R>) -> bool {
-        self[prim as usize].intersect_p(ray)
+        self.get(prim as usize).is_some_and(|member| member.intersect_p(ray))
     }
     fn all_hits(
         &self,
@@ -153,13 +154,13 @@ impl<R: Real, P: Primitive<R>> Geometry<R> for Vec<P> {
         each: &mut dyn FnMut(Hit<Self::At, R>) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let mut named = |hit: Hit<P::At, R>| each(Hit { t: hit.t, at: Member { prim, at: hit.at } });
-        self[prim as usize].all_hits(ray, &mut named)
+        self.get(prim as usize).map_or(ControlFlow::Continue(()), |member| member.all_hits(ray, &mut named))
     }
     fn intersect_counted(&self, prim: u32, ray: &Ray<R>, counts: &mut Counts) -> Option<Hit<Self::At, R>> {
-        member(prim, self[prim as usize].intersect_counted(ray, counts))
+        member(prim, self.get(prim as usize)?.intersect_counted(ray, counts))
     }
     fn intersect_p_counted(&self, prim: u32, ray: &Ray<R>, counts: &mut Counts) -> bool {
-        self[prim as usize].intersect_p_counted(ray, counts)
+        self.get(prim as usize).is_some_and(|member| member.intersect_p_counted(ray, counts))
     }
 }
 

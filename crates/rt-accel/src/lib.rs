@@ -44,7 +44,7 @@
 //! assert!(!scene.intersect_p(&ray.between(4.0, 9.0)));
 //! ```
 //!
-//! # Where this departs from the plan it was built from
+//! # Why the traits are cut as they are
 //!
 //! * The world bound stands in a trait of its own, [`WorldBound`], because a primitive answers rays of two precisions: asked
 //!   of `Primitive<f32>` and `Primitive<f64>` alike, `world_bound` would need a type annotation from users who know of one.

@@ -47,6 +47,9 @@ pub trait Primitive<R: Real = f32>: WorldBound {
 
     /// Every hit, in no order, each once. The default reports the closest only: override it where a ray may meet the thing
     /// more than once.
+    ///
+    /// Hits are counted as crossings: a boundary that the ray meets exactly is owned by one side, so on the rim of an open
+    /// surface there may be a closest hit and no crossing.
     fn all_hits(
         &self,
         ray: &Ray<R>,

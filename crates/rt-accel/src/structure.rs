@@ -118,7 +118,9 @@ pub trait Structure: Sized + Send + Sync {
 
 /// Structures that follow moving primitives without rebuilding.
 pub trait Refit: Structure {
-    /// New bounds for the same primitives in the same tree. Quality may fall; answers stay right.
+    /// New bounds for the same primitives in the same tree. Quality may fall; answers stay right for every primitive that stood
+    /// in the tree when it was built: one that was left out then ([`Structure::skipped`]) stays out until the next build, and
+    /// so does one with a number that did not exist.
     fn refit(&mut self, prims: &dyn Bounded);
 }
 

@@ -387,8 +387,7 @@ impl Plane {
         match *self {
             Plane::Bin { slots, axis, last_left } => slots.of(r.center)[axis.index()] <= last_left,
             Plane::Reference { axis, center, prim } => {
-                let c = r.center[axis.index()];
-                c < center || c == center && r.prim <= prim
+                r.center[axis.index()].total_cmp(&center).then(r.prim.cmp(&prim)).is_le()
             }
         }
     }

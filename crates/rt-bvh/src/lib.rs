@@ -29,7 +29,7 @@
 //! # Layout
 //!
 //! A [`Node`] is the two boxes of its children side by side in the order the slab test reads them, and where the children
-//! are: 64 bytes, one cache line, tested at once. (A node per box of 32 bytes, as first planned, needs a shuffle for every
+//! are: 64 bytes, one cache line, tested at once. (A node per box of 32 bytes would need a shuffle for every
 //! plane to test two at once.) Nodes stand in depth-first order, so children come after their parents and a left child
 //! usually follows its parent directly.
 //!

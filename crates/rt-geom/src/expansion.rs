@@ -246,6 +246,20 @@ impl DoubleDouble {
         self.hi + self.lo
     }
 
+    /// Rounded to odd: to the neighbour with an odd last digit, where it is not an `f64` itself. Rounding that to a shorter
+    /// precision rounds the number itself, once.
+    ///
+    /// Source: Boldo and Melquiond, "When double rounding is odd" (2005).
+    pub(crate) fn odd(self) -> f64 {
+        if self.lo == 0.0 || self.hi.to_bits() & 1 == 1 {
+            self.hi
+        } else if self.lo > 0.0 {
+            self.hi.next_up()
+        } else {
+            self.hi.next_down()
+        }
+    }
+
     /// The square root; NaN below zero.
     pub fn sqrt(self) -> DoubleDouble {
         let first = self.hi.sqrt();
@@ -379,6 +393,18 @@ mod tests {
             let rest: Expansion<6> = exact.minus(&Expansion::<2>::difference(sum.hi, -sum.lo));
             prop_assert!(rest.value().abs() <= (ex.value().abs() + ey.value().abs()) * (2f64).powi(-102));
         }
+    }
+
+    #[test]
+    fn halves_between_floats_round_by_what_lies_below() {
+        use crate::Real;
+        let (one, step) = (1.0f32, 1.0f32.next_up() - 1.0);
+        let half = one as f64 + step as f64 / 2.0;
+        let tiny = 1e-25;
+        assert_eq!(f32::nearest_wide(DoubleDouble::difference(half, -tiny)), one.next_up());
+        assert_eq!(f32::nearest_wide(DoubleDouble::difference(half, tiny)), one);
+        assert_eq!(f32::nearest_wide(half.into()), one); // to even
+        assert_eq!(f64::nearest_wide(DoubleDouble::difference(half, tiny)), half);
     }
 
     #[test]

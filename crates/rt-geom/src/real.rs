@@ -1,5 +1,6 @@
 //! [`Real`]: the two precisions a ray may be asked in.
 
+use crate::expansion::DoubleDouble;
 use core::fmt::{Debug, Display};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use glam::{DVec3, Vec3A};
@@ -45,7 +46,10 @@ pub trait Real:
 
     /// The nearest number of this precision, ties to even.
     fn nearest(x: f64) -> Self;
-    /// The greatest `f64` that rounds to `self` or less.
+    /// The nearest number of this precision, ties to even, rounded once.
+    fn nearest_wide(x: DoubleDouble) -> Self;
+    /// The greatest `f64` that becomes `self` or less when [`Ray::admit`](crate::Ray::admit) rounds it: infinity for the greatest
+    /// number, which all beyond it become.
     fn reach(self) -> f64;
     /// The least number greater than `self`.
     fn next_up(self) -> Self;
@@ -91,12 +95,12 @@ impl Real for f32 {
         x as f32
     }
     #[inline]
+    fn nearest_wide(x: DoubleDouble) -> f32 {
+        x.odd() as f32
+    }
+    #[inline]
     fn reach(self) -> f64 {
-        if self == f32::MAX {
-            // The last numbers before infinity round to MAX.
-            return f64::from_bits(0x47ef_ffff_efff_ffff);
-        }
-        if self == f32::INFINITY {
+        if self >= f32::MAX {
             return f64::INFINITY;
         }
         let middle = (self as f64 + self.next_up() as f64) * 0.5;
@@ -128,8 +132,12 @@ impl Real for f64 {
         x
     }
     #[inline(always)]
+    fn nearest_wide(x: DoubleDouble) -> f64 {
+        x.value()
+    }
+    #[inline(always)]
     fn reach(self) -> f64 {
-        self
+        if self == f64::MAX { f64::INFINITY } else { self }
     }
     #[inline(always)]
     fn next_up(self) -> f64 {
@@ -188,16 +196,17 @@ mod tests {
             let x = f32::from_bits(bits);
             prop_assume!(x > f32::NEG_INFINITY);
             let reach = x.reach();
-            prop_assert!(reach as f32 <= x);
-            prop_assert!(x == f32::INFINITY || reach.next_up() as f32 > x);
+            prop_assert!(x == f32::MAX || reach as f32 <= x);
+            prop_assert!(x >= f32::MAX || reach.next_up() as f32 > x);
         }
     }
 
     #[test]
     fn reach_at_the_ends() {
-        for x in [f32::MAX, f32::MIN, 0.0, -0.0, 1.0, f32::MIN_POSITIVE] {
+        for x in [f32::MIN, 0.0, -0.0, 1.0, f32::MIN_POSITIVE] {
             assert!(x.reach() as f32 <= x && x.reach().next_up() as f32 > x, "{x}");
         }
         assert_eq!(f32::INFINITY.reach(), f64::INFINITY);
+        assert_eq!((f32::MAX.reach(), f64::MAX.reach(), 2.0f64.reach()), (f64::INFINITY, f64::INFINITY, 2.0));
     }
 }

@@ -44,7 +44,7 @@ pub enum TransformError {
     NotFinite,
     /// The determinant is zero, or the inverse is not representable.
     Singular {
-        /// The determinant of the linear part.
+        /// The determinant of the linear part, its columns scaled to lengths about 1.
         determinant: f64,
     },
 }
@@ -81,9 +81,15 @@ impl Transform {
             return Err(TransformError::NotFinite);
         }
         let linear = map.matrix3;
-        let determinant = linear.determinant();
-        let inverse = linear.inverse();
-        if determinant == 0.0 || !inverse.is_finite() {
+        // Columns in units of a power of two each, so that neither size nor stretch takes the determinant out of range.
+        let units = linear.to_cols_array_2d().map(|column| unit_of(DVec3::from_array(column)));
+        let [x, y, z] = units;
+        let normal = DMat3::from_cols(linear.x_axis / x, linear.y_axis / y, linear.z_axis / z);
+        let determinant = normal.determinant();
+        let rows = normal.inverse().transpose();
+        let inverse = DMat3::from_cols(rows.x_axis / x, rows.y_axis / y, rows.z_axis / z).transpose();
+        let lost = [inverse.x_axis, inverse.y_axis, inverse.z_axis].contains(&DVec3::ZERO);
+        if determinant == 0.0 || !inverse.is_finite() || lost {
             return Err(TransformError::Singular { determinant });
         }
         Ok(Transform { linear, inverse, translation: map.translation, order: Order::LinearFirst })
@@ -215,6 +221,12 @@ impl Transform {
     }
 }
 
+/// The power of two that brings the largest component of `v` into `[1, 2)`; 1 for zero.
+fn unit_of(v: DVec3) -> f64 {
+    let exponent = v.abs().max_element().to_bits() >> 52;
+    if v == DVec3::ZERO { 1.0 } else { f64::from_bits(exponent.clamp(1, 2045) << 52) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -245,6 +257,15 @@ mod tests {
             let n = map.normal(u.cross(v));
             prop_assert!(n.dot(map.vector(u)).abs() < 1e-9);
             prop_assert!(n.dot(map.vector(v)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn sizes_near_the_ends_of_the_range_can_be_inverted() {
+        for size in [1e-300, 1e-107, 1e103, 1e300] {
+            let map = Transform::scale(DVec3::new(size, 1.0, -size)).unwrap();
+            let back = map.inverse().point(map.point(DVec3::new(3.0, 5.0, 7.0)));
+            assert!((back - DVec3::new(3.0, 5.0, 7.0)).length() < 1e-14, "{size:e}");
         }
     }
 

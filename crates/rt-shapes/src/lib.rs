@@ -27,8 +27,9 @@
 //!
 //! # Invariants
 //!
-//! This crate knows no structure. `t` comes from one formula whose relative error is below half a unit of the ray's precision
-//! (`2^-33` for `f32`, `2^-52` for `f64`), whatever the condition of the problem.
+//! This crate knows no structure. The `t` of a triangle is the exact distance, correctly rounded to the ray's precision, whatever
+//! the condition of the problem; so neighbours that are met at a shared vertex are met at one `t`. That of a sphere is within
+//! `2^-33` of half a unit in the last place.
 //!
 //! [`Uv`] is `f32` for rays of either precision: it orders nothing and decides nothing, and [`Surface`] is computed afresh in
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.

@@ -127,9 +127,19 @@ impl<V: Real> TriangleMesh<V> {
     }
 
     /// Triangle `prim` by its corners.
-    #[inline(always)]
+    ///
+    /// # Panics
+    ///
+    /// When there is no such triangle.
+    #[inline]
     pub fn triangle(&self, prim: u32) -> Triangle {
-        Triangle { corners: self.corners(prim).map(widen) }
+        Triangle { corners: self.triangles[prim as usize].map(|i| widen(self.vertices[i as usize])) }
+    }
+
+    #[inline(always)]
+    fn get(&self, prim: u32) -> Option<Triangle> {
+        let corners = self.triangles.get(prim as usize)?;
+        Some(Triangle { corners: corners.map(|i| widen(self.vertices[i as usize])) })
     }
 
     /// How many triangles have no area: equal or collinear corners, decided in `f64`.
@@ -139,11 +149,6 @@ impl<V: Real> TriangleMesh<V> {
             (b - a).cross(c - a) == DVec3::ZERO
         };
         (0..self.triangles.len() as u32).filter(flat).count()
-    }
-
-    #[inline(always)]
-    fn corners(&self, prim: u32) -> [[V; 3]; 3] {
-        self.triangles[prim as usize].map(|i| self.vertices[i as usize])
     }
 
     /// The interpolated normal, if there is one with a direction.
@@ -173,7 +178,7 @@ impl<V: Real> Bounded for TriangleMesh<V> {
 
     #[inline]
     fn bound_from(&self, prim: u32, origin: DVec3) -> Aabb {
-        let [a, b, c] = self.triangle(prim).corners;
+        let [a, b, c] = self.get(prim).map_or([DVec3::NAN; 3], |triangle| triangle.corners);
         if !(a.is_finite() && b.is_finite() && c.is_finite()) {
             return Aabb::new(Vec3A::NAN, Vec3A::NAN);
         }
@@ -186,7 +191,7 @@ impl<R: Real, V: Real + Into<R>> Geometry<R> for TriangleMesh<V> {
 
     #[inline(always)]
     fn intersect(&self, prim: u32, ray: &Ray<R>) -> Option<Hit<Uv, R>> {
-        self.triangle(prim).intersect(ray).map(|meeting| hit(prim, meeting))
+        self.get(prim)?.intersect(ray).map(|meeting| hit(prim, meeting))
     }
 
     fn all_hits(
@@ -195,7 +200,7 @@ impl<R: Real, V: Real + Into<R>> Geometry<R> for TriangleMesh<V> {
         ray: &Ray<R>,
         each: &mut dyn FnMut(Hit<Uv, R>) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        match self.triangle(prim).cross(ray) {
+        match self.get(prim).and_then(|triangle| triangle.cross(ray)) {
             Some(meeting) => each(hit(prim, meeting)),
             None => ControlFlow::Continue(()),
         }

@@ -19,7 +19,8 @@ const POLISHED: f64 = 1e-10;
 /// rest. Roots are polished by a Newton step on a compensated residual: relative error below `2^-50` except within about
 /// `2^-48` of tangency, where they come from the exact discriminant. `all_hits` reports both roots.
 ///
-/// Exact for coordinates, radius and direction between `2^-150` and `2^150`; outside, rounded as `f64` rounds.
+/// Exact where the coordinates, radius and components of the direction, as far as they are not zero, span at most `2^150` each;
+/// beyond, rounded as `f64` rounds.
 ///
 /// Source: Haines, Günther, Akenine-Möller, "Precision improvements for ray/sphere intersection", *Ray Tracing Gems* (2019),
 /// chapter 7.
@@ -60,6 +61,12 @@ impl fmt::Display for SphereError {
 
 impl core::error::Error for SphereError {}
 
+/// Whether products of four such factors stay in range; false for NaN.
+#[inline(always)]
+fn moderate(x: f64) -> bool {
+    x > 1e-60 && x < 1e60
+}
+
 impl Sphere {
     /// The sphere around `center`.
     ///
@@ -89,6 +96,29 @@ impl Sphere {
     /// Both distances at which the line meets the sphere, the lesser first; equal for a tangent.
     #[inline]
     fn roots(&self, o: DVec3, d: DVec3) -> Option<[f64; 2]> {
+        let (size, speed) = ((o - self.center).abs().max_element().max(self.radius), d.abs().max_element());
+        if moderate(size) && moderate(speed) {
+            return self.roots_in_range(o, d);
+        }
+        self.roots_scaled(o, d, size, speed)
+    }
+
+    /// [`Sphere::roots`] for sizes whose products leave the range of `f64`: the same sphere and ray, in other units.
+    #[cold]
+    fn roots_scaled(&self, o: DVec3, d: DVec3, size: f64, speed: f64) -> Option<[f64; 2]> {
+        if !(size.is_finite() && o.is_finite() && d.is_finite()) || speed == 0.0 {
+            return None;
+        }
+        let power = |x: f64| f64::from_bits((x.to_bits() >> 52).clamp(30, 2000) << 52);
+        let (unit, pace) = (power(size), power(speed));
+        let ball = Sphere { center: self.center / unit, radius: self.radius / unit };
+        let roots = ball.roots_in_range(o / unit, d / pace)?;
+        // In the order that stays in range.
+        Some(roots.map(|t| if (t * unit).is_finite() { t * unit / pace } else { t / pace * unit }))
+    }
+
+    #[inline(always)]
+    fn roots_in_range(&self, o: DVec3, d: DVec3) -> Option<[f64; 2]> {
         let l = o - self.center;
         let r = self.radius;
         let a = d.dot(d);
@@ -242,6 +272,22 @@ mod tests {
             assert_eq!(at(1.0), Some(distance));
             assert_eq!(at(1.0f64.next_up()), None);
             assert!(at(1.0f64.next_down()).is_some_and(|t| t < distance));
+        }
+    }
+
+    #[test]
+    fn sizes_and_speeds_beyond_any_product_are_met() {
+        for size in [1e-300, 1e-165, 1e-90, 1.0, 1e100, 1e300] {
+            for speed in [1e-250, 1e-165, 1e-60, 1.0, 1e160, 1e250] {
+                let ball = Sphere::new(DVec3::Z * (5.0 * size), size).unwrap();
+                let ray = Ray::new(DVec3::ZERO, DVec3::Z * speed);
+                let (exact, met) = (4.0 * size / speed, ball.intersect(&ray));
+                assert!(met.is_some(), "{size:e} {speed:e}");
+                if exact.is_normal() {
+                    assert!((met.unwrap().t / exact - 1.0).abs() < 1e-15, "{size:e} {speed:e} {met:?}");
+                }
+                assert_eq!(ball.intersect(&Ray { origin: DVec3::X * (3.0 * size), ..ray }), None);
+            }
         }
     }
 

@@ -7,10 +7,16 @@ use rt_geom::{Ray, Real};
 /// Unit roundoff of `f64`.
 const U: f64 = f64::EPSILON / 2.0;
 
-/// Beyond these sizes of a product of three factors, everything is scaled before it is computed: nothing then under- or
-/// overflows. No `f32` triangle and ray comes near them.
-const SMALL: f64 = 1e-200;
-const LARGE: f64 = 1e200;
+/// Beyond these sizes of a triangle or a direction, everything is scaled before it is computed: products of three factors, and
+/// their errors, then neither under- nor overflow. No `f32` triangle and ray comes near them.
+const SMALL: f64 = 1e-80;
+const LARGE: f64 = 1e80;
+
+/// Whether products of three such factors stay in range; false for NaN.
+#[inline(always)]
+fn moderate(size: f64, speed: f64) -> bool {
+    size > SMALL && size < LARGE && speed > SMALL && speed < LARGE
+}
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +33,7 @@ pub struct Meeting<R: Real = f32> {
 ///
 /// The test works in three stages: rounded `f64` with an error bound settles almost all rays; then exact expansions settle
 /// the sign of each edge volume the bound leaves open. The distance comes from `f64`, from double-double or from expansions,
-/// whichever first has a relative error the ray's precision does not see.
+/// whichever first is certain to round as the exact one does: `t` is the exact distance, correctly rounded.
 ///
 /// ```
 /// use rt_geom::{Ray, glam::{DVec3, Vec3A}};
@@ -38,7 +44,7 @@ pub struct Meeting<R: Real = f32> {
 /// ```
 ///
 /// Error: none in the decision, for corners and origins whose nonzero differences, and directions whose nonzero components,
-/// span at most `2^300`; below one unit in the last place in `t`.
+/// span at most `2^300`; half a unit in the last place in `t`.
 ///
 /// Source: edge volumes after Segura and Feito, "Algorithms to test ray-triangle intersection" (2001); filter and fallback
 /// after Shewchuk 1997; the perturbation after Edelsbrunner and Mücke, "Simulation of simplicity" (1990).
@@ -81,11 +87,11 @@ impl Triangle {
         let size = a.abs().max(b.abs()).max(c.abs()).max_element();
         // Differences, products and sums: at most 8 roundings of the 6 terms, each at most |d_i| size^2.
         let bound = 16.0 * U * d.abs().element_sum() * size * size;
-        if volumes.iter().any(|&v| v > bound) && volumes.iter().any(|&v| v < -bound) && bound < LARGE {
+        let moderate = moderate(size, d.abs().max_element());
+        if moderate && volumes.iter().any(|&v| v > bound) && volumes.iter().any(|&v| v < -bound) {
             return None;
         }
-        let certain = volumes.iter().all(|v| v.abs() > bound);
-        if certain && bound > SMALL && bound < LARGE {
+        if moderate && volumes.iter().all(|v| v.abs() > bound) {
             return self.distance(o, d, ray, volumes);
         }
         self.settle(o, d, ray, volumes, bound, edges)
@@ -105,10 +111,15 @@ impl Triangle {
         if !(self.corners.iter().all(|v| v.is_finite()) && o.is_finite() && d.is_finite()) {
             return None;
         }
-        if !(bound > SMALL && bound < LARGE) {
+        let [a, b, c] = self.corners;
+        let size = self.size_from(o);
+        let speed = d.abs().max_element();
+        if size == 0.0 || speed == 0.0 {
+            return None;
+        }
+        if !moderate(size, speed) {
             return self.settle_scaled(o, d, ray, edges);
         }
-        let [a, b, c] = self.corners;
         let pairs = [(b, c), (c, a), (a, b)];
         let mut exact = volumes;
         let mut signs = [0; 3];
@@ -136,31 +147,41 @@ impl Triangle {
         self.distance(o, d, ray, exact)
     }
 
+    /// The largest component of the way from `o` to a corner; where that overflows, of a corner or of `o`.
+    fn size_from(&self, o: DVec3) -> f64 {
+        let size = self.corners.iter().fold(DVec3::ZERO, |m, &v| m.max((v - o).abs())).max_element();
+        if size.is_finite() {
+            size
+        } else {
+            self.corners.iter().fold(o.abs(), |m, v| m.max(v.abs())).max_element()
+        }
+    }
+
     /// [`Triangle::settle`] for sizes whose products leave the range of `f64`: the same triangle and ray, in other units.
     #[cold]
     fn settle_scaled<R: Real>(&self, o: DVec3, d: DVec3, ray: &Ray<R>, edges: Edges) -> Option<Meeting<R>> {
-        let reach = self.corners.iter().fold(o.abs(), |m, v| m.max(v.abs())).max_element();
-        let speed = d.abs().max_element();
-        if speed == 0.0 {
+        let (unit, pace) = (power_of_two(self.size_from(o)), power_of_two(d.abs().max_element()));
+        let near: f64 = ray.t_min.into();
+        let scaled = Triangle { corners: self.corners.map(|v| v / unit) };
+        let slow = Ray {
+            origin: o / unit,
+            dir: d / pace,
+            t_min: if near == 0.0 { 0.0 } else { f64::NEG_INFINITY },
+            t_max: f64::INFINITY,
+        };
+        let Ray { origin: o, dir: d, .. } = slow;
+        let size = scaled.size_from(o);
+        if !moderate(size, d.abs().max_element()) {
             return None;
         }
-        let (unit, pace) = (power_of_two(reach), power_of_two(speed));
-        let scale = |v: DVec3| v * (1.0 / unit);
-        let scaled = Triangle { corners: self.corners.map(scale) };
-        let slow =
-            Ray { origin: scale(o), dir: d * (1.0 / pace), t_min: f64::NEG_INFINITY, t_max: f64::INFINITY };
-        let size =
-            scaled.corners.iter().fold(DVec3::ZERO, |m, &v| m.max((v - slow.origin).abs())).max_element();
-        let bound = 16.0 * U * slow.dir.abs().element_sum() * size * size;
-        if !(bound > SMALL && bound < LARGE) {
-            return None;
-        }
-        let [a, b, c] = scaled.corners.map(|v| v - slow.origin);
-        let volumes = [slow.dir.dot(b.cross(c)), slow.dir.dot(c.cross(a)), slow.dir.dot(a.cross(b))];
-        let met = scaled.settle(slow.origin, slow.dir, &slow, volumes, bound, edges)?;
-        // In two steps, so that neither leaves the range alone.
-        let t = ray.admit(met.t * unit / pace)?;
-        Some(Meeting { t, u: met.u, v: met.v })
+        let [a, b, c] = scaled.corners.map(|v| v - o);
+        let volumes = [d.dot(b.cross(c)), d.dot(c.cross(a)), d.dot(a.cross(b))];
+        let bound = 16.0 * U * d.abs().element_sum() * size * size;
+        let met = scaled.settle(o, d, &slow, volumes, bound, edges)?;
+        // In the order that stays in range.
+        let t = met.t * unit;
+        let t = if t.is_finite() { t / pace } else { met.t / pace * unit };
+        Some(Meeting { t: ray.admit(t)?, u: met.u, v: met.v })
     }
 
     /// The distance to the plane, for a ray that meets the triangle with these edge volumes.
@@ -176,26 +197,29 @@ impl Triangle {
         let error = |value: f64, terms: f64| 9.0 * U * terms / value.abs();
         let relative = error(above, p.dot(a.abs())) + error(along, p.dot(d.abs()));
         let t = above / along;
-        let t = if relative < R::ROOT_ERROR {
-            t
+        let near: f64 = ray.t_min.into();
+        let slack = t.abs() * (relative + f64::EPSILON) * 2.0;
+        // The error decides neither the near end nor the last place.
+        let rounds = || R::nearest(t - slack) == R::nearest(t + slack);
+        let t = if relative < R::ROOT_ERROR && (t - near).abs() > slack && rounds() {
+            ray.admit(t)?
         } else {
             // Far outside the interval whatever the error: no need for more digits.
-            let slack = t.abs() * relative * 2.0;
-            if relative < 0.25 && (t + slack < ray.t_min.into() || t - slack > ray.t_max.reach()) {
+            if relative < 0.25 && (t + slack < near || t - slack > ray.t_max.reach()) {
                 return None;
             }
-            self.distance_wide(o, d, R::ROOT_ERROR)
+            ray.admit(self.distance_wide::<R>(o, d, near)?.into())?
         };
-        let t = ray.admit(t)?;
         let sum = volumes[0] + volumes[1] + volumes[2];
         let u = (volumes[1] / sum).clamp(0.0, 1.0);
         let v = (volumes[2] / sum).clamp(0.0, 1.0 - u);
         Some(Meeting { t, u, v })
     }
 
-    /// The distance with twice the digits, and with all of them where that is not enough.
+    /// The distance, correctly rounded, with twice the digits, and with all of them where that is not enough; `None` if it is
+    /// less than `near`.
     #[cold]
-    fn distance_wide(&self, o: DVec3, d: DVec3, tolerance: f64) -> f64 {
+    fn distance_wide<R: Real>(&self, o: DVec3, d: DVec3, near: f64) -> Option<R> {
         let [v0, v1, v2] = self.corners;
         let minus = |p: DVec3, q: DVec3| [0, 1, 2].map(|i| DoubleDouble::difference(p[i], q[i]));
         let (a, e1, e2) = (minus(v0, o), minus(v1, v0), minus(v2, v0));
@@ -208,18 +232,64 @@ impl Triangle {
         // At most eight operations, each within 2^-102.
         let error = |value: f64, terms: f64| 128.0 * U * U * terms / value.abs();
         let relative = error(above.value(), p.dot(pa)) + error(along.value(), p.dot(d.abs()));
-        if relative < tolerance { (above / along).value() } else { self.distance_exact(o, d) }
+        let wide = above / along;
+        let t = wide.value();
+        let relative = relative + 256.0 * U * U;
+        if relative < f64::ROOT_ERROR && (t - near).abs() > t.abs() * (2.0 * f64::EPSILON) {
+            let slack = DoubleDouble::from(t.abs() * relative);
+            let rounded = R::nearest_wide(wide - slack);
+            if t < near {
+                return None;
+            }
+            if rounded == R::nearest_wide(wide + slack) {
+                return Some(rounded);
+            }
+        }
+        self.distance_exact(o, d, near)
     }
 
+    /// The distance from exact numbers, correctly rounded, and compared with `near` exactly: a ray may begin just where it hits.
     #[cold]
-    fn distance_exact(&self, o: DVec3, d: DVec3) -> f64 {
+    fn distance_exact<R: Real>(&self, o: DVec3, d: DVec3, near: f64) -> Option<R> {
         let [v0, v1, v2] = self.corners;
         let (a, e1, e2) = (exact_minus(v0, o), exact_minus(v1, v0), exact_minus(v2, v0));
         let n = exact_cross(&e1, &e2);
         let products: [Expansion<64>; 3] = [0, 1, 2].map(|i| n[i].times(&a[i]));
         let above: Expansion<128> = products[0].plus(&products[1]);
         let above: Expansion<192> = above.plus(&products[2]);
-        (above.rounded() / exact_dot(&n, d).rounded()).value()
+        let along = exact_dot(&n, d);
+        // The sign of the distance less `x + y`.
+        let beyond = |x: f64, y: f64| {
+            let (x, y): (Expansion<192>, Expansion<192>) = (along.scaled(x), along.scaled(y));
+            let point: Expansion<384> = x.plus(&y);
+            let rest: Expansion<576> = above.minus(&point);
+            rest.sign() * along.sign()
+        };
+        let wide = above.rounded() / along.rounded();
+        let t = wide.value();
+        if (t - near).abs() > t.abs() * (2.0 * f64::EPSILON) {
+            // An end far from `t`, or at infinity, needs no exact comparison.
+            if t < near {
+                return None;
+            }
+        } else if beyond(near, 0.0) < 0 {
+            return None;
+        }
+        let rounded = R::nearest_wide(wide);
+        let value: f64 = rounded.into();
+        for next in [rounded.next_up(), rounded.next_down()] {
+            let half = (next.into() - value) * 0.5;
+            if half.is_finite() && half != 0.0 && value.is_finite() {
+                let past = beyond(value, half) * if half > 0.0 { 1 } else { -1 };
+                if past > 0 {
+                    return Some(next);
+                }
+                if past == 0 {
+                    return Some(R::nearest(value + half)); // the even one
+                }
+            }
+        }
+        Some(rounded)
     }
 }
 
@@ -387,6 +457,48 @@ mod tests {
         );
     }
 
+    #[test]
+    fn a_ray_may_begin_where_it_hits() {
+        let t = triangle(
+            [-895092.0, -1297893.0, 371957.0],
+            [1124488.0, -1097414.0, 329892.0],
+            [225464.0, -1829161.0, -1161905.0],
+        );
+        let ray =
+            Ray::new(Vec3A::new(642033.0, -720754.0, -249796.0), Vec3A::new(-163471.0, -229134.0, 32148.0));
+        for (t_min, t_max, met) in [
+            (0.0, 9.0, true),
+            (3.0, 3.0, true),
+            (3.0, 9.0, true),
+            (0.0, 3.0, true),
+            (3.0f32.next_up(), 9.0, false),
+            (0.0, 3.0f32.next_down(), false),
+        ] {
+            assert_eq!(
+                t.intersect(&ray.between(t_min, t_max)).map(|m| m.t),
+                met.then_some(3.0),
+                "{t_min} {t_max}"
+            );
+        }
+    }
+
+    #[test]
+    fn sizes_and_speeds_beyond_any_product_are_met() {
+        for size in [1e-300, 1e-165, 1e-120, 1e-90, 1.0, 1e104, 1e130, 1e160, 1e300] {
+            for speed in [1e-250, 1e-150, 1e-60, 1.0, 1e100, 1e150, 1e250] {
+                let t = triangle([-size, -size, size], [size, -size, size], [0.0, size, size]);
+                let ray = Ray::new(DVec3::new(size * 0.1, size * 0.1, 0.0), DVec3::Z * speed);
+                let (exact, met) = (size / speed, t.intersect(&ray));
+                assert!(met.is_some(), "{size:e} {speed:e}");
+                if exact.is_normal() {
+                    assert!((met.unwrap().t / exact - 1.0).abs() < 1e-15, "{size:e} {speed:e} {met:?}");
+                }
+                let beside = Ray { origin: DVec3::new(size * 1.1, 0.0, 0.0), ..ray };
+                assert_eq!(t.intersect(&beside), None);
+            }
+        }
+    }
+
     /// Around a vertex and along the edges of a fan, a perturbed ray crosses exactly one triangle.
     #[test]
     fn a_fan_is_crossed_once() {
@@ -415,9 +527,12 @@ mod tests {
             let o = DVec3::from_array(o);
             let d = a + (b - a) * u + (c - a) * w - o;
             if let Some(m) = t.intersect(&Ray::new(o, d)) {
-                let exact = t.distance_exact(o, d);
-                prop_assert!((m.t - exact).abs() <= f64::EPSILON * exact.abs());
-                prop_assert!((t.distance_wide(o, d, 1e-9) - exact).abs() <= f64::EPSILON * exact.abs());
+                let exact: f64 = t.distance_exact(o, d, 0.0).unwrap();
+                prop_assert_eq!(m.t, exact);
+                prop_assert_eq!(t.distance_wide::<f64>(o, d, 0.0).unwrap(), exact);
+                let narrow = Ray::new(o, d).between(0.0, f64::INFINITY);
+                let single: Option<f32> = t.distance_exact(narrow.origin, narrow.dir, 0.0);
+                prop_assert_eq!(t.distance_wide::<f32>(o, d, 0.0), single);
                 prop_assert!(m.u >= 0.0 && m.v >= 0.0 && m.u + m.v <= 1.0);
             }
         }
