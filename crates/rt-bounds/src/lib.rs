@@ -23,6 +23,8 @@
 
 mod aabb;
 mod slab;
+mod volume;
 
 pub use aabb::Aabb;
 pub use slab::{BoxPair, SlabRay};
+pub use volume::BoundingVolume;
