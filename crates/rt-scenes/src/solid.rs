@@ -5,7 +5,7 @@ use rt_accel::{Counts, Hit, Primitive, WorldBound};
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
-use rt_shapes::{Polygon, Shape, Sphere, Surface, Uv};
+use rt_shapes::{Partials, Polygon, Shape, Sphere, Surface, Uv};
 
 /// One solid of a mixed scene: answers as the shape inside does, rays of both precisions.
 ///
@@ -87,5 +87,8 @@ impl<R: Real> Primitive<R> for Solid {
 impl<R: Real> Shape<R> for Solid {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
         each!(self, shape => shape.surface(ray, hit))
+    }
+    fn partials(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Partials {
+        each!(self, shape => shape.partials(ray, hit))
     }
 }

@@ -43,5 +43,5 @@ mod triangle;
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
 pub use sphere::{Sphere, SphereError};
-pub use surface::{Shape, Surface, Surfaced, Uv};
+pub use surface::{Partials, Shape, Surface, Surfaced, Uv};
 pub use triangle::{Meeting, Triangle, moller_trumbore};

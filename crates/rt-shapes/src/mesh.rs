@@ -1,6 +1,6 @@
 //! [`TriangleMesh`]: indexed triangles.
 
-use crate::{Meeting, Surface, Surfaced, Triangle, Uv};
+use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Bounded, Geometry, Hit};
@@ -153,11 +153,28 @@ impl<V: Real> TriangleMesh<V> {
 
     /// The interpolated normal, if there is one with a direction.
     fn shading(&self, prim: u32, weights: [f64; 3]) -> Option<DVec3> {
-        if self.normals.is_empty() {
-            return None;
-        }
-        let [a, b, c] = self.triangles[prim as usize].map(|i| widen(self.normals[i as usize]));
+        let [a, b, c] = self.normals_of(prim)?;
         (a * weights[0] + b * weights[1] + c * weights[2]).try_normalize()
+    }
+
+    fn normals_of(&self, prim: u32) -> Option<[DVec3; 3]> {
+        let of = |i: u32| widen(self.normals[i as usize]);
+        (!self.normals.is_empty()).then(|| self.triangles[prim as usize].map(of))
+    }
+
+    fn uvs_of(&self, prim: u32) -> Option<[DVec2; 3]> {
+        let of = |i: u32| DVec2::from(self.uvs[i as usize].map(f64::from));
+        (!self.uvs.is_empty()).then(|| self.triangles[prim as usize].map(of))
+    }
+
+    /// The weights of the corners at a hit, in full precision.
+    fn weights<R: Real>(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> [f64; 3] {
+        let line = Ray { t_min: -R::INFINITY, t_max: R::INFINITY, ..*ray };
+        let (u, v) = match self.triangle(hit.at.prim).intersect(&line) {
+            Some(meeting) => (meeting.u, meeting.v),
+            None => (hit.at.u as f64, hit.at.v as f64),
+        };
+        [1.0 - u - v, u, v]
     }
 }
 
@@ -215,20 +232,12 @@ pub(crate) fn hit<R: Real>(prim: u32, Meeting { t, u, v }: Meeting<R>) -> Hit<Uv
 impl<R: Real, V: Real + Into<R>> Surfaced<R> for TriangleMesh<V> {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
         let prim = hit.at.prim;
-        let triangle = self.triangle(prim);
-        // The weights in full precision.
-        let (u, v) = match triangle.intersect(&Ray { t_min: -R::INFINITY, t_max: R::INFINITY, ..*ray }) {
-            Some(meeting) => (meeting.u, meeting.v),
-            None => (hit.at.u as f64, hit.at.v as f64),
-        };
-        let weights = [1.0 - u - v, u, v];
-        let mut surface = triangle.surface(weights);
-        surface.uv = if self.uvs.is_empty() {
-            DVec2::new(u, v)
-        } else {
-            let [a, b, c] =
-                self.triangles[prim as usize].map(|i| DVec2::from(self.uvs[i as usize].map(f64::from)));
-            a * weights[0] + b * weights[1] + c * weights[2]
+        let [w, u, v] = self.weights(ray, hit);
+        let weights = [w, u, v];
+        let mut surface = self.triangle(prim).surface(weights);
+        surface.uv = match self.uvs_of(prim) {
+            Some([a, b, c]) => a * w + b * u + c * v,
+            None => DVec2::new(u, v),
         };
         if let Some(shading) = self.shading(prim, weights) {
             // The vertex normals decide which side is outside.
@@ -238,6 +247,46 @@ impl<R: Real, V: Real + Into<R>> Surfaced<R> for TriangleMesh<V> {
             surface.shading = shading;
         }
         surface
+    }
+
+    /// Along the mesh's own texture coordinates where it has such and they are not degenerate on this triangle, else along two
+    /// of its edges.
+    fn partials(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Partials {
+        let prim = hit.at.prim;
+        let [a, b, c] = self.triangle(prim).corners;
+        let along = Along::of(self.uvs_of(prim));
+        let [dpdu, dpdv] = along.differences(a, b, c);
+        let mut partials = Partials { dpdu, dpdv, ..Partials::default() };
+        if let Some([na, nb, nc]) = self.normals_of(prim) {
+            let [w0, w1, w2] = self.weights(ray, hit);
+            let long = na * w0 + nb * w1 + nc * w2;
+            if let Some(unit) = long.try_normalize() {
+                // The derivative of what is normalised, without its part along the normal.
+                let turn = |dn: DVec3| (dn - unit * unit.dot(dn)) / long.length();
+                [partials.dndu, partials.dndv] = along.differences(na, nb, nc).map(turn);
+            }
+        }
+        partials
+    }
+}
+
+/// Weights by which differences along two edges of a triangle become differences along u and v.
+struct Along([DVec2; 2]);
+
+impl Along {
+    /// Of the texture coordinates of the corners. Source: Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed.
+    /// (2023), section 6.5.2.
+    fn of(uvs: Option<[DVec2; 3]>) -> Along {
+        let edges = || Along([DVec2::X, DVec2::Y]);
+        let Some([a, b, c]) = uvs else { return edges() };
+        let (b, c) = (b - a, c - a);
+        let area = b.perp_dot(c);
+        let [du, dv] = [DVec2::new(c.y, -b.y) / area, DVec2::new(-c.x, b.x) / area];
+        if du.is_finite() && dv.is_finite() { Along([du, dv]) } else { edges() }
+    }
+
+    fn differences(&self, a: DVec3, b: DVec3, c: DVec3) -> [DVec3; 2] {
+        self.0.map(|along| (b - a) * along.x + (c - a) * along.y)
     }
 }
 

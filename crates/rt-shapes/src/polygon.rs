@@ -1,7 +1,7 @@
 //! [`Polygon`]: planar polygons.
 
 use crate::mesh::hit;
-use crate::{Shape, Surface, Triangle, Uv};
+use crate::{Partials, Shape, Surface, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Hit, Primitive, WorldBound};
@@ -177,6 +177,11 @@ impl<R: Real> Shape<R> for Polygon {
         // The part's own normal, on the polygon's side: corners may be off the plane.
         let side = if surface.normal.dot(self.normal) < 0.0 { -surface.normal } else { surface.normal };
         Surface { normal: side, shading: side, ..surface }
+    }
+
+    fn partials(&self, _ray: &Ray<R>, hit: &Hit<Uv, R>) -> Partials {
+        let [a, b, c] = self.triangles[hit.at.prim as usize].corners;
+        Partials { dpdu: b - a, dpdv: c - a, ..Partials::default() }
     }
 }
 

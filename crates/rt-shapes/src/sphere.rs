@@ -1,6 +1,6 @@
 //! [`Sphere`]: full spheres.
 
-use crate::{Shape, Surface, Uv};
+use crate::{Partials, Shape, Surface, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Hit, Primitive, WorldBound};
@@ -255,6 +255,15 @@ impl<R: Real> Shape<R> for Sphere {
         let uv =
             DVec2::new(longitude.rem_euclid(1.0), normal.z.clamp(-1.0, 1.0).acos() / std::f64::consts::PI);
         Surface { point, error, normal, shading: normal, uv }
+    }
+
+    fn partials(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Partials {
+        let normal = self.surface(ray, hit).normal;
+        let across = normal.truncate().length();
+        let (x, y) = if across > 0.0 { (normal.x / across, normal.y / across) } else { (1.0, 0.0) };
+        let dndu = DVec3::new(-normal.y, normal.x, 0.0) * std::f64::consts::TAU;
+        let dndv = DVec3::new(x * normal.z, y * normal.z, -across) * std::f64::consts::PI;
+        Partials { dpdu: dndu * self.radius, dpdv: dndv * self.radius, dndu, dndv }
     }
 }
 

@@ -80,27 +80,58 @@ fn away<R: Real>(p: DVec3, side: DVec3) -> R::Vec3 {
     R::Vec3::nearest(rounded)
 }
 
+/// How the surface runs at a hit: derivatives of its point and of its unit normal along the parameters [`Surface::uv`], in world
+/// space, in `f64`.
+///
+/// The normal is [`Surface::shading`], which is the surface's own unless vertex normals are interpolated. Where a parameter does
+/// not move the point (the pole of a sphere, the tip of a cone) its derivatives are zero.
+///
+/// Source: the Weingarten equations: do Carmo, *Differential Geometry of Curves and Surfaces* (1976), section 3.3.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Partials {
+    /// Derivative of the point along u.
+    pub dpdu: DVec3,
+    /// Derivative of the point along v.
+    pub dpdv: DVec3,
+    /// Derivative of the unit normal along u.
+    pub dndu: DVec3,
+    /// Derivative of the unit normal along v.
+    pub dndv: DVec3,
+}
+
 /// A primitive that can describe its surface. Object-safe: `Arc<dyn Shape<At = Uv>>` makes a mixed scene.
 pub trait Shape<R: Real = f32>: Primitive<R> {
     /// The surface at `hit`, which this shape reported for `ray`.
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Self::At, R>) -> Surface;
+
+    /// How the surface runs there: asked by those who filter, bump or follow ray differentials.
+    fn partials(&self, ray: &Ray<R>, hit: &Hit<Self::At, R>) -> Partials;
 }
 
 /// A geometry that can do the same for each of its primitives; its aggregates are then [`Shape`]s.
 pub trait Surfaced<R: Real = f32>: Geometry<R> {
     /// The surface at `hit`, which this geometry reported for `ray`.
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Self::At, R>) -> Surface;
+
+    /// How the surface runs there.
+    fn partials(&self, ray: &Ray<R>, hit: &Hit<Self::At, R>) -> Partials;
 }
 
 impl<R: Real, S: Structure, G: Surfaced<R>> Shape<R> for Aggregate<S, G> {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<G::At, R>) -> Surface {
         self.geometry().surface(ray, hit)
     }
+    fn partials(&self, ray: &Ray<R>, hit: &Hit<G::At, R>) -> Partials {
+        self.geometry().partials(ray, hit)
+    }
 }
 
 impl<R: Real, P: Shape<R>> Surfaced<R> for Vec<P> {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Member<P::At>, R>) -> Surface {
         self[hit.at.prim as usize].surface(ray, &Hit { t: hit.t, at: hit.at.at })
+    }
+    fn partials(&self, ray: &Ray<R>, hit: &Hit<Member<P::At>, R>) -> Partials {
+        self[hit.at.prim as usize].partials(ray, &Hit { t: hit.t, at: hit.at.at })
     }
 }
 
@@ -121,6 +152,25 @@ impl<R: Real, P: Shape<f64>> Shape<R> for Instance<P> {
             uv: inner.uv,
         }
     }
+
+    fn partials(&self, ray: &Ray<R>, hit: &Hit<P::At, R>) -> Partials {
+        let (object_ray, object_hit) = (self.object_ray(ray), Hit { t: hit.t.into(), at: hit.at });
+        let inner = self.inner().partials(&object_ray, &object_hit);
+        let map = self.to_world();
+        // The derivative of a unit normal has no part along it: carried as a normal, then freed of that part again.
+        let long = map.normal(self.inner().surface(&object_ray, &object_hit).shading);
+        let unit = long.normalize_or_zero();
+        let turn = |dn: DVec3| {
+            let carried = map.normal(dn);
+            (carried - unit * unit.dot(carried)) / long.length()
+        };
+        Partials {
+            dpdu: map.vector(inner.dpdu),
+            dpdv: map.vector(inner.dpdv),
+            dndu: turn(inner.dndu),
+            dndv: turn(inner.dndv),
+        }
+    }
 }
 
 macro_rules! forward {
@@ -128,6 +178,9 @@ macro_rules! forward {
         impl<R: Real, P: Shape<R> + ?Sized> Shape<R> for $pointer {
             fn surface(&self, ray: &Ray<R>, hit: &Hit<P::At, R>) -> Surface {
                 (**self).surface(ray, hit)
+            }
+            fn partials(&self, ray: &Ray<R>, hit: &Hit<P::At, R>) -> Partials {
+                (**self).partials(ray, hit)
             }
         }
     )*};
