@@ -4,9 +4,7 @@ use crate::judge::{Answers, Judge, Sample};
 use crate::subject::RaySet;
 use core::fmt;
 use core::hint::black_box;
-use rt_accel::{Aggregate, Bounded, Counts, Geometry, Hit, Leaf, Member, Primitive, Structure};
-use rt_bounds::Aabb;
-use rt_geom::glam::DVec3;
+use rt_accel::{Aggregate, Bounded, Counts, Geometry, Member, Primitive, Structure};
 use rt_geom::{Ray, Real};
 use rt_measure::clock::{Plan, race};
 use rt_measure::error::HitError;
@@ -362,43 +360,6 @@ where
         exact: label.exact,
         answers,
         shoot,
-    }
-}
-
-/// Somebody else's geometry: many trees over one mesh, in the memory of one.
-#[derive(Debug)]
-pub(crate) struct Borrowed<'a, G>(pub(crate) &'a G);
-
-impl<G: Bounded> Bounded for Borrowed<'_, G> {
-    fn prim_count(&self) -> usize {
-        self.0.prim_count()
-    }
-    fn bound(&self, prim: u32) -> Aabb {
-        self.0.bound(prim)
-    }
-    fn bound_from(&self, prim: u32, origin: DVec3) -> Aabb {
-        self.0.bound_from(prim, origin)
-    }
-}
-
-impl<R: Real, G: Geometry<R>> Geometry<R> for Borrowed<'_, G> {
-    type At = G::At;
-
-    #[inline(always)]
-    fn intersect(&self, prim: u32, ray: &Ray<R>) -> Option<Hit<G::At, R>> {
-        self.0.intersect(prim, ray)
-    }
-    #[inline(always)]
-    fn intersect_p(&self, prim: u32, ray: &Ray<R>) -> bool {
-        self.0.intersect_p(prim, ray)
-    }
-    #[inline(always)]
-    fn intersect_leaf(&self, leaf: Leaf<'_>, ray: &mut Ray<R>) -> Option<Hit<Member<G::At>, R>> {
-        self.0.intersect_leaf(leaf, ray)
-    }
-    #[inline(always)]
-    fn intersect_p_leaf(&self, leaf: Leaf<'_>, ray: &Ray<R>) -> bool {
-        self.0.intersect_p_leaf(leaf, ray)
     }
 }
 

@@ -3,7 +3,7 @@
 //! Values that lead to the same tree, as large leaves do wherever the surface area heuristic prefers small ones, are timed
 //! all the same: what they differ by is noise, and no difference below it means anything.
 
-use crate::contest::{Borrowed, Contestant, Group, Label, Named, Weigh, build_all, contest, ours};
+use crate::contest::{Contestant, Group, Label, Named, Weigh, build_all, contest, ours};
 use crate::judge::Judge;
 use crate::subject::{Prims, RayKind, RaySet, Subject};
 use crate::{Effort, Options, Trouble, Watch, hear};
@@ -85,7 +85,7 @@ where
     let mut scenes = Vec::new();
     for ((name, params), (built, ms)) in values.iter().zip(build_all(effort.builds(), &mut turns)) {
         built?;
-        scenes.push((name, Aggregate::<Bvh, _>::build(Borrowed(geometry), params)?, ms));
+        scenes.push((name, Aggregate::<Bvh, _>::build(geometry, params)?, ms));
     }
     tell(0)?;
     let judge = Judge::new(&subject.prims);

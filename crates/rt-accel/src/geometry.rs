@@ -5,6 +5,7 @@ use core::ops::ControlFlow;
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
+use std::sync::Arc;
 
 /// Numbered primitives with bounds: all a builder may know. A number that does not exist has a bound that is not valid, and is
 /// never hit: structures outlive changes to what they were built over.
@@ -168,3 +169,66 @@ impl<R: Real, P: Primitive<R>> Geometry<R> for Vec<P> {
 fn member<A, R: Real>(prim: u32, hit: Option<Hit<A, R>>) -> Option<Hit<Member<A>, R>> {
     hit.map(|hit| Hit { t: hit.t, at: Member { prim, at: hit.at } })
 }
+
+/// Forwards both traits through a pointer, so that several structures share one geometry.
+macro_rules! forward {
+    ($($pointer:ty),*) => {$(
+        impl<G: Bounded + ?Sized> Bounded for $pointer {
+            fn prim_count(&self) -> usize {
+                (**self).prim_count()
+            }
+            #[inline]
+            fn bound(&self, prim: u32) -> Aabb {
+                (**self).bound(prim)
+            }
+            #[inline]
+            fn bound_from(&self, prim: u32, origin: DVec3) -> Aabb {
+                (**self).bound_from(prim, origin)
+            }
+            fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
+                (**self).clipped_bound(prim, cell, origin)
+            }
+        }
+
+        impl<R: Real, G: Geometry<R> + ?Sized> Geometry<R> for $pointer {
+            type At = G::At;
+            #[inline(always)]
+            fn intersect(&self, prim: u32, ray: &Ray<R>) -> Option<Hit<G::At, R>> {
+                (**self).intersect(prim, ray)
+            }
+            #[inline(always)]
+            fn intersect_p(&self, prim: u32, ray: &Ray<R>) -> bool {
+                (**self).intersect_p(prim, ray)
+            }
+            fn all_hits(
+                &self,
+                prim: u32,
+                ray: &Ray<R>,
+                each: &mut dyn FnMut(Hit<G::At, R>) -> ControlFlow<()>,
+            ) -> ControlFlow<()> {
+                (**self).all_hits(prim, ray, each)
+            }
+            #[inline(always)]
+            fn intersect_leaf(&self, leaf: Leaf<'_>, ray: &mut Ray<R>) -> Option<Hit<Member<G::At>, R>> {
+                (**self).intersect_leaf(leaf, ray)
+            }
+            #[inline(always)]
+            fn intersect_p_leaf(&self, leaf: Leaf<'_>, ray: &Ray<R>) -> bool {
+                (**self).intersect_p_leaf(leaf, ray)
+            }
+            fn intersect_counted(
+                &self,
+                prim: u32,
+                ray: &Ray<R>,
+                counts: &mut Counts,
+            ) -> Option<Hit<G::At, R>> {
+                (**self).intersect_counted(prim, ray, counts)
+            }
+            fn intersect_p_counted(&self, prim: u32, ray: &Ray<R>, counts: &mut Counts) -> bool {
+                (**self).intersect_p_counted(prim, ray, counts)
+            }
+        }
+    )*};
+}
+
+forward!(&G, Arc<G>);

@@ -9,8 +9,7 @@ use core::fmt;
 use core::ops::ControlFlow;
 use hostile::{all_rays, sample};
 use rt_accel::{
-    Aggregate, Bounded, BuildError, Counts, Exhaustive, Geometry, Hit, Leaf, Member, Primitive, Refit,
-    Structure,
+    Aggregate, Bounded, BuildError, Counts, Exhaustive, Geometry, Hit, Leaf, Primitive, Refit, Structure,
 };
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
@@ -123,12 +122,12 @@ where
 {
     let trial = Trial::<S> { name, marker: core::marker::PhantomData };
     trial.watched(geometry, params)?;
-    let mine = trial.built(Aggregate::<S, _>::build(Borrowed(geometry), params))?;
-    let truth = trial.built(Aggregate::<Exhaustive, _>::build(Borrowed(geometry), &()))?;
+    let mine = trial.built(Aggregate::<S, _>::build(geometry, params))?;
+    let truth = trial.built(Aggregate::<Exhaustive, _>::build(geometry, &()))?;
     trial.shape(geometry, mine.structure(), truth.structure())?;
     let again = trial.built(S::build(geometry, params))?;
     trial.same_shape(mine.structure(), &again)?;
-    let again = Aggregate::<S, _>::build(Borrowed(geometry), params);
+    let again = Aggregate::<S, _>::build(geometry, params);
     trial.answers(&mine, &truth, &trial.built(again)?, &all_rays(geometry, rays))
 }
 
@@ -151,12 +150,12 @@ where
 {
     let trial = Trial::<S> { name, marker: core::marker::PhantomData };
     let refitted = || {
-        let mut mine = trial.built(Aggregate::<S, _>::build(Borrowed(before), params))?;
-        mine.update(|geometry| *geometry = Borrowed(after));
+        let mut mine = trial.built(Aggregate::<S, _>::build(before, params))?;
+        mine.update(|geometry| *geometry = after);
         Ok(mine)
     };
     let (mine, again) = (refitted()?, refitted()?);
-    let truth = trial.built(Aggregate::<Exhaustive, _>::build(Borrowed(after), &()))?;
+    let truth = trial.built(Aggregate::<Exhaustive, _>::build(after, &()))?;
     trial.shape(after, mine.structure(), truth.structure())?;
     trial.same_shape(mine.structure(), again.structure())?;
     trial.answers(&mine, &truth, &again, &all_rays(after, rays))
@@ -184,55 +183,6 @@ pub fn paste<R: Real>(ray: &Ray<R>) -> String {
         ray.t_min,
         ray.t_max,
     )
-}
-
-/// A geometry that is borrowed, so that several aggregates share it.
-#[derive(Debug)]
-struct Borrowed<'a, G>(&'a G);
-
-impl<G: Bounded> Bounded for Borrowed<'_, G> {
-    fn prim_count(&self) -> usize {
-        self.0.prim_count()
-    }
-    fn bound(&self, prim: u32) -> Aabb {
-        self.0.bound(prim)
-    }
-    fn bound_from(&self, prim: u32, origin: DVec3) -> Aabb {
-        self.0.bound_from(prim, origin)
-    }
-    fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
-        self.0.clipped_bound(prim, cell, origin)
-    }
-}
-
-impl<R: Real, G: Geometry<R>> Geometry<R> for Borrowed<'_, G> {
-    type At = G::At;
-    fn intersect(&self, prim: u32, ray: &Ray<R>) -> Option<Hit<G::At, R>> {
-        self.0.intersect(prim, ray)
-    }
-    fn intersect_p(&self, prim: u32, ray: &Ray<R>) -> bool {
-        self.0.intersect_p(prim, ray)
-    }
-    fn all_hits(
-        &self,
-        prim: u32,
-        ray: &Ray<R>,
-        each: &mut dyn FnMut(Hit<G::At, R>) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        self.0.all_hits(prim, ray, each)
-    }
-    fn intersect_leaf(&self, leaf: Leaf<'_>, ray: &mut Ray<R>) -> Option<Hit<Member<G::At>, R>> {
-        self.0.intersect_leaf(leaf, ray)
-    }
-    fn intersect_p_leaf(&self, leaf: Leaf<'_>, ray: &Ray<R>) -> bool {
-        self.0.intersect_p_leaf(leaf, ray)
-    }
-    fn intersect_counted(&self, prim: u32, ray: &Ray<R>, counts: &mut Counts) -> Option<Hit<G::At, R>> {
-        self.0.intersect_counted(prim, ray, counts)
-    }
-    fn intersect_p_counted(&self, prim: u32, ray: &Ray<R>, counts: &mut Counts) -> bool {
-        self.0.intersect_p_counted(prim, ray, counts)
-    }
 }
 
 /// A structure on trial over a named geometry.
@@ -361,9 +311,9 @@ impl<S: Structure> Trial<'_, S> {
 
     fn answers<R: Real, G: Geometry<R>>(
         &self,
-        mine: &Aggregate<S, Borrowed<'_, G>>,
-        truth: &Aggregate<Exhaustive, Borrowed<'_, G>>,
-        again: &Aggregate<S, Borrowed<'_, G>>,
+        mine: &Aggregate<S, &G>,
+        truth: &Aggregate<Exhaustive, &G>,
+        again: &Aggregate<S, &G>,
         rays: &[Ray<R>],
     ) -> Result<(), Failure>
     where

@@ -187,3 +187,18 @@ macro_rules! forward {
 }
 
 forward!(&P, Box<P>, Arc<P>);
+
+macro_rules! forward_surfaced {
+    ($($pointer:ty),*) => {$(
+        impl<R: Real, G: Surfaced<R> + ?Sized> Surfaced<R> for $pointer {
+            fn surface(&self, ray: &Ray<R>, hit: &Hit<G::At, R>) -> Surface {
+                (**self).surface(ray, hit)
+            }
+            fn partials(&self, ray: &Ray<R>, hit: &Hit<G::At, R>) -> Partials {
+                (**self).partials(ray, hit)
+            }
+        }
+    )*};
+}
+
+forward_surfaced!(&G, Arc<G>);
