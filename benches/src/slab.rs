@@ -168,6 +168,8 @@ fn timed(
         sah: None,
         error: *error,
         has_t: false,
+        void: None,
+        figures: Vec::new(),
         on_front: false,
     });
     let mut measured: Vec<Measured> = measured.collect();

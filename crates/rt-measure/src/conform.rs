@@ -9,9 +9,8 @@ use core::fmt;
 use core::ops::ControlFlow;
 use hostile::{all_rays, sample};
 use rt_accel::{
-    Aggregate, Bounded, BuildError, Counts, Exhaustive, Geometry, Hit, Leaf, Primitive, Refit, Structure,
+    Aggregate, Bounded, BuildError, Counts, Exhaustive, Geometry, Hit, Primitive, Refit, Structure,
 };
-use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real, Vector};
 use std::collections::HashSet;
