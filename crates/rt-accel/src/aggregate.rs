@@ -243,6 +243,9 @@ impl<R: Real, G: Geometry<R>> Visitor<R> for CountedClosest<'_, G, G::At, R> {
     fn node(&mut self) {
         self.counts.nodes += 1;
     }
+    fn spared(&mut self) {
+        self.counts.spared += 1;
+    }
 }
 
 /// [`Any`], with counts.
@@ -265,6 +268,9 @@ impl<R: Real, G: Geometry<R>> Visitor<R> for CountedAny<'_, G> {
     }
     fn node(&mut self) {
         self.counts.nodes += 1;
+    }
+    fn spared(&mut self) {
+        self.counts.spared += 1;
     }
 }
 
