@@ -194,6 +194,29 @@ impl SlabRay {
         (met & 1 == 1).then_some(entry[0])
     }
 
+    /// Where the ray enters the box and where it leaves it or ends, rounded outward, in the unit of [`SlabRay::entry`]; `None` for
+    /// a certain miss.
+    #[inline]
+    pub fn span(&self, b: &Aabb) -> Option<[f32; 2]> {
+        let t = self.spans(&BoxPair::new(b, b));
+        (t.x <= -t.z).then_some([t.x, -t.z])
+    }
+
+    /// Where the ray crosses the plane at `position` on `axis`, rounded down and up, in the unit of [`SlabRay::entry`]: for
+    /// structures that split space. A crossing behind the ray's start is negative, by some amount. A ray parallel to the plane
+    /// crosses it beyond everything (`[large, inf]`) or before (`[-large, -inf]`), and one within it all along (`[0, inf]`).
+    #[inline(always)]
+    pub fn crossing(&self, axis: Axis, position: f32) -> [f32; 2] {
+        let (o, i) = (self.origin[axis.index()], self.inverse[axis.index()]);
+        [(position - o.x) * i.x, (o.z - position) * i.z]
+    }
+
+    /// Whether the ray's direction is negative along each axis: it then meets the greater of two planes first.
+    #[inline(always)]
+    pub fn negative(&self) -> [bool; 3] {
+        self.negative
+    }
+
     /// The distance beyond which no box matters, in the unit of [`SlabRay::entry`].
     #[inline(always)]
     pub fn far(&self) -> f32 {
@@ -203,15 +226,21 @@ impl SlabRay {
     /// [`SlabRay::entry`] of two boxes at once: which are met (bit 0 the left, bit 1 the right), and where.
     #[inline(always)]
     pub fn enter_pair(&self, pair: &BoxPair) -> (u32, [f32; 2]) {
+        let t = self.spans(pair);
+        let met = t.cmple(-t.zwzw()).bitmask() & 3;
+        (met, [t.x, t.y])
+    }
+
+    /// Entries into two boxes, and exits negated, so that one maximum serves both.
+    #[inline(always)]
+    fn spans(&self, pair: &BoxPair) -> Vec4 {
         let mut t = Vec4::new(self.near, self.near, -self.far, -self.far);
         for a in 0..3 {
             let planes = Vec4::from_array(pair.planes[a]);
             let planes = if self.negative[a] { planes.zwxy() } else { planes };
-            // Entries, and exits negated, so that one maximum serves both.
             t = ((planes - self.origin[a]) * self.inverse[a]).max(t);
         }
-        let met = t.cmple(-t.zwzw()).bitmask() & 3;
-        (met, [t.x, t.y])
+        t
     }
 }
 

@@ -1,5 +1,6 @@
 //! [`TriangleMesh`]: indexed triangles.
 
+use crate::clip::clipped_bound;
 use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
@@ -200,6 +201,15 @@ impl<V: Real> Bounded for TriangleMesh<V> {
             return Aabb::new(Vec3A::NAN, Vec3A::NAN);
         }
         Aabb::from_f64(a.min(b).min(c), a.max(b).max(c), origin)
+    }
+
+    fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
+        match self.get(prim) {
+            Some(triangle) if triangle.corners.iter().all(|c| c.is_finite()) => {
+                clipped_bound(triangle.corners, cell, origin)
+            }
+            _ => Aabb::EMPTY,
+        }
     }
 }
 
