@@ -1,5 +1,9 @@
 //! [`Mailbox`]: which primitives a ray has met, for structures that repeat primitives.
 
+use crate::{Leaf, Visitor};
+use core::ops::ControlFlow;
+use rt_geom::{Ray, Real};
+
 /// Remembers some of the primitives a ray was tested against, so that one that stands in several cells is not tested in each.
 ///
 /// It lives on the stack, one for each ray, so that threads and rays within rays share nothing. It may forget, which costs a
@@ -16,15 +20,51 @@
 /// assert!(met.is_new(11) && met.is_new(3)); // 11 took the place of 3
 /// ```
 pub trait Mailbox: Default {
+    /// Whether it never remembers anything, so that leaves need not be sifted.
+    const BLANK: bool = false;
+
     /// Whether `prim` is not remembered; it then is.
     fn is_new(&mut self, prim: u32) -> bool;
+
+    /// Shows `visit` a leaf without the primitives that are remembered, in one piece or several.
+    #[inline(always)]
+    fn show<R: Real>(
+        &mut self,
+        leaf: Leaf<'_>,
+        ray: &mut Ray<R>,
+        visit: &mut impl Visitor<R>,
+    ) -> ControlFlow<()> {
+        if Self::BLANK {
+            return visit.leaf(leaf, ray);
+        }
+        for some in leaf.prims.chunks(SIFTED) {
+            let (mut sifted, mut count) = ([0; SIFTED], 0);
+            for &prim in some {
+                if self.is_new(prim) {
+                    sifted[count] = prim;
+                    count += 1;
+                } else {
+                    visit.spared();
+                }
+            }
+            if count > 0 {
+                visit.leaf(Leaf { first: leaf.first, prims: &sifted[..count] }, ray)?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
 }
+
+/// How many primitives of a leaf are sifted at a time.
+const SIFTED: usize = 16;
 
 /// Remembers nothing, at no cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoMailbox;
 
 impl Mailbox for NoMailbox {
+    const BLANK: bool = true;
+
     #[inline(always)]
     fn is_new(&mut self, _prim: u32) -> bool {
         true

@@ -1,14 +1,12 @@
 //! The tree answers as every primitive in turn does, bit for bit: closest, any, all, many; in both precisions.
 
-use rt_accel::{Bounded, Instance, Structure};
-use rt_bounds::Aabb;
+use rt_accel::Instance;
 use rt_bvh::{Builder, Bvh, BvhParams};
-use rt_geom::Real;
 use rt_geom::glam::DVec3;
-use rt_geom::{Ray, Transform};
-use rt_measure::{conform, rays};
-use rt_scenes::{SceneGeometry, Solid};
-use rt_shapes::TriangleMesh;
+use rt_geom::{Real, Transform};
+use rt_measure::conform;
+use rt_measure::rays::troublesome;
+use rt_scenes::{SceneGeometry, Solid, Trial};
 
 /// The default, and trees as bad as the parameters can make them.
 fn params() -> [BvhParams; 2] {
@@ -21,55 +19,28 @@ fn params() -> [BvhParams; 2] {
     [BvhParams::default(), deep]
 }
 
-/// Rays that make trouble for this geometry: at its vertices, in the faces of its boxes, through all of it.
-fn troublesome<R: Real>(source: &dyn Bounded, points: &[DVec3]) -> Vec<Ray<R>> {
-    let finite = |b: &Aabb| b.is_valid() && b.min.is_finite() && b.max.is_finite();
-    let bounds = (0..source.prim_count() as u32).map(|prim| source.bound(prim)).filter(finite);
-    let world = bounds.fold(Aabb::EMPTY, Aabb::union);
-    if !world.is_valid() {
-        return Vec::new();
-    }
-    let some: Vec<DVec3> =
-        points.iter().copied().filter(|p| p.is_finite()).step_by(1 + points.len() / 24).collect();
-    let mut all = rays::uniform(1, &world, 60);
-    all.extend(rays::aimed(2, &world, &some, 2));
-    all.extend(rays::axis_parallel(&world, &some[..some.len().min(8)]));
-    all.extend(rays::in_faces(3, &world, 24));
-    all.extend(rays::inside(4, &world, 24));
-    all
-}
-
-fn vertices<V: Real>(mesh: &TriangleMesh<V>) -> Vec<DVec3> {
-    let widen = |v: &[V; 3]| DVec3::from_array(v.map(Into::into));
-    let mut points: Vec<DVec3> = mesh.vertices().iter().map(widen).collect();
-    for corners in mesh.triangles().iter().step_by(7) {
-        let [a, b, _] = corners.map(|i| points[i as usize]);
-        points.push((a + b) * 0.5);
-    }
-    points
-}
-
-fn check<S: Structure<Params = BvhParams>, V: Real + Into<R>, R: Real>(name: &str, mesh: &TriangleMesh<V>) {
-    let rays = troublesome::<R>(mesh, &vertices(mesh));
+fn check<V: Real + Into<R>, R: Real>(trial: &Trial<V>) {
+    let rays = troublesome::<R>(&trial.mesh, &trial.points());
     for params in params() {
-        conform::conform::<S, R, _>(name, mesh, &params, &rays).unwrap_or_else(|why| panic!("{why}"));
+        conform::conform::<Bvh, R, _>(&trial.name, &trial.mesh, &params, &rays)
+            .unwrap_or_else(|why| panic!("{why}"));
     }
 }
 
 #[test]
 fn on_every_trial_in_f32() {
     for trial in rt_scenes::trials() {
-        check::<Bvh, f32, f32>(&trial.name, &trial.mesh);
+        check::<f32, f32>(&trial);
     }
 }
 
 #[test]
 fn on_every_trial_in_f64() {
     for trial in rt_scenes::trials() {
-        check::<Bvh, f32, f64>(&trial.name, &trial.mesh);
+        check::<f32, f64>(&trial);
     }
     for trial in rt_scenes::fine_trials() {
-        check::<Bvh, f64, f64>(&trial.name, &trial.mesh);
+        check::<f64, f64>(&trial);
     }
 }
 
@@ -129,7 +100,8 @@ fn after_a_refit() {
     for [x, y, z] in after.vertices_mut() {
         (*x, *y, *z) = (*y - 0.5 * *z, 2.0 * *x, *z + 3.0);
     }
-    let rays = troublesome::<f32>(&after, &vertices(&after));
+    let points = Trial { name: String::new(), mesh: after.clone() }.points();
+    let rays = troublesome::<f32>(&after, &points);
     conform::conform_refit::<Bvh, f32, _>("soup of 500", &before, &after, &BvhParams::default(), &rays)
         .unwrap_or_else(|why| panic!("{why}"));
 }
