@@ -21,10 +21,8 @@ fn params() -> [BvhParams; 2] {
 
 fn check<V: Real + Into<R>, R: Real>(trial: &Trial<V>) {
     let rays = troublesome::<R>(&trial.mesh, &trial.points());
-    for params in params() {
-        conform::conform::<Bvh, R, _>(&trial.name, &trial.mesh, &params, &rays)
-            .unwrap_or_else(|why| panic!("{why}"));
-    }
+    conform::conform_all::<Bvh, R, _>(&trial.name, &trial.mesh, &params(), &rays)
+        .unwrap_or_else(|why| panic!("{why}"));
 }
 
 #[test]
