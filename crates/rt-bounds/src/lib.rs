@@ -22,9 +22,12 @@
 //! yet, because the conservative test costs no operation more.
 
 mod aabb;
+mod moving;
+mod overlap;
 mod slab;
 mod volume;
 
 pub use aabb::Aabb;
+pub use overlap::{BeamTest, ConeTest};
 pub use slab::{BoxPair, SlabRay};
 pub use volume::BoundingVolume;
