@@ -69,9 +69,6 @@ impl ConeTest {
             EdgeKind { across, across2, lead: lead.copysign(along) }
         });
         let [near, far] = cone.range();
-        // Nothing lies before the apex of a convex cone: there is no plane to cut with.
-        let near =
-            if cos > 0.0 && near * sin + cone.radius() * cos <= 0.0 { f64::NEG_INFINITY } else { near };
         ConeTest { cone: *cone, near, far, edges }
     }
 
@@ -229,7 +226,7 @@ impl EdgeKind {
 /// A beam made ready, once, to be tested against boxes.
 ///
 /// Never misses a box that meets the exact beam, the set between its [corner rays](Beam::corners). Says *met* wrongly only within
-/// some `32 u` of the distances involved, and for boxes that are infinite on a side that matters. Empty and invalid boxes meet nothing.
+/// some `32 u` of the distances involved. Empty and invalid boxes meet nothing.
 ///
 /// By separating directions, which are all tried: of the faces of both, and across each pair of edges. First the beam is cut to the
 /// depths of the box, so that no direction is spoilt by what happens to its rounding far away.
@@ -313,7 +310,9 @@ impl BeamTest {
             return false;
         }
         let (lo, hi) = (b.min.as_dvec3() - self.origin, b.max.as_dvec3() - self.origin);
-        let reach = lo.abs().max(hi.abs()).element_sum();
+        // Infinite sides do not round.
+        let finite = |v: DVec3| v.to_array().map(|x| if x.is_finite() { x.abs() } else { 0.0 });
+        let reach = DVec3::from_array(finite(lo)).max(DVec3::from_array(finite(hi))).element_sum();
         // The depths of the box. A corner's direction has depth 1 but for rounding.
         let [first, last] = span(self.depth, lo, hi);
         let slack = reach * self.depth.abs().max_element() * ROUNDINGS;
@@ -326,7 +325,9 @@ impl BeamTest {
         if near > far {
             return false;
         }
-        let slack = (reach + self.size[0] + far * self.size[1]) * ROUNDINGS;
+        // Where there is no end, a direction that seems to go along the beam may lead out of it by rounding.
+        let (end, tilt) = if far < f64::INFINITY { (far, 0.0) } else { (near, self.size[1] * ROUNDINGS) };
+        let slack = (reach + self.size[0] + end * self.size[1]) * ROUNDINGS;
         let middle = (lo + hi) * 0.5;
         let mut holds_middle = middle.is_finite() && {
             let depth = middle.dot(self.depth);
@@ -337,8 +338,8 @@ impl BeamTest {
                 return true;
             }
             let [first, last] = span(e.direction, lo, hi);
-            let least = e.origin[0] + (near * e.dir[0]).min(far * e.dir[0]);
-            let most = e.origin[1] + (near * e.dir[1]).max(far * e.dir[1]);
+            let least = e.origin[0] + (near * e.dir[0]).min(far * (e.dir[0] - tilt));
+            let most = e.origin[1] + (near * e.dir[1]).max(far * (e.dir[1] + tilt));
             // NaN, from beyond the range, decides nothing.
             if last < least - slack || first > most + slack {
                 return false;
