@@ -11,19 +11,28 @@ use glam::DVec3;
 /// assert_eq!(unit(DVec3::ZERO), None);
 /// ```
 pub fn unit(v: DVec3) -> Option<DVec3> {
+    let (scaled, _) = scaled(v)?;
+    Some(scaled / scaled.length())
+}
+
+/// `v` times a power of two that brings its square into range, and the exponent that takes it back.
+fn scaled(v: DVec3) -> Option<(DVec3, i32)> {
     let largest = v.abs().max_element();
     if !v.is_finite() || largest == 0.0 {
         return None;
     }
-    // A power of two brings the square into range.
-    let e = -exponent(largest);
-    let v = DVec3::new(ldexp(v.x, e), ldexp(v.y, e), ldexp(v.z, e));
-    Some(v / v.length())
+    let e = exponent(largest);
+    Some((DVec3::new(ldexp(v.x, -e), ldexp(v.y, -e), ldexp(v.z, -e)), e))
 }
 
-/// The angle between two directions of any length, in `[0, pi]`, within some 10 roundings relatively, at angles near 0
-/// and `pi` too (there, of `pi` minus it: where the arc cosine of the dot product has lost half of the digits). NaN if a direction is zero
-/// or not finite.
+/// The length of a finite vector, however short.
+fn length(v: DVec3) -> f64 {
+    scaled(v).map_or(0.0, |(v, e)| ldexp(v.length(), e))
+}
+
+/// The angle between two directions of any length, in `[0, pi]`, within some 10 roundings, relatively at angles near 0
+/// and absolutely near `pi`: where the arc cosine of the dot product has lost half of the digits. NaN if a direction is
+/// zero or not finite.
 ///
 /// Source: Kahan, *How Futile are Mindless Assessments of Roundoff in Floating-Point Computation?* (2006), section 12.
 ///
@@ -34,7 +43,7 @@ pub fn unit(v: DVec3) -> Option<DVec3> {
 /// ```
 pub fn angle_between(a: DVec3, b: DVec3) -> f64 {
     match (unit(a), unit(b)) {
-        (Some(a), Some(b)) => 2.0 * (a - b).length().atan2((a + b).length()),
+        (Some(a), Some(b)) => 2.0 * length(a - b).atan2(length(a + b)),
         _ => f64::NAN,
     }
 }
