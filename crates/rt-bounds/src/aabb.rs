@@ -185,8 +185,8 @@ impl Aabb {
         p.max(self.min).min(self.max)
     }
 
-    /// The squared distance from `p`, 0 inside and infinite from an empty box, within `5 u` relatively, `u = 2^-53`, as long as it
-    /// neither under- nor overflows. NaN for a NaN.
+    /// The squared distance from `p`, 0 inside and infinite from an empty box, within `5 u` relatively, `u = 2^-53`, as
+    /// long as it neither under- nor overflows. NaN for a NaN.
     pub fn distance_squared(self, p: DVec3) -> f64 {
         if self.is_empty() {
             return f64::INFINITY;
@@ -207,9 +207,9 @@ impl Aabb {
         sum
     }
 
-    /// The part of a ray that may lie in the box, its ends in units of the ray's `t`, rounded outward by a few `u = 2^-53`: it
-    /// holds all `t` of the interval for which the exact point lies in the box. `None` where there are none. Segments are rays with an
-    /// interval; for many boxes, a [`SlabRay`](crate::SlabRay) answers faster.
+    /// The part of a ray that may lie in the box, its ends in units of the ray's `t`, rounded outward by a few `u =
+    /// 2^-53`: it holds all `t` of the interval for which the exact point lies in the box. `None` where there are none.
+    /// Segments are rays with an interval; for many boxes, a [`SlabRay`](crate::SlabRay) answers faster.
     ///
     /// ```
     /// # use rt_bounds::Aabb;
@@ -235,7 +235,8 @@ impl Aabb {
             }
             let (first, last) =
                 if d[a] > 0.0 { (below / d[a], above / d[a]) } else { (above / d[a], below / d[a]) };
-            // One rounding each of the difference and of the quotient, and no exact distance is infinite but to a side that is.
+            // One rounding each of the difference and of the quotient, and no exact distance is infinite but to a side
+            // that is.
             let slack = 2.0 * f64::EPSILON;
             enter = enter.max((first - first.abs() * slack).next_down().min(f64::MAX));
             leave = leave.min((last + last.abs() * slack).next_up().max(f64::MIN));
@@ -265,8 +266,8 @@ impl Aabb {
         let half = (max - min) * 0.5;
         let reach = m.abs() * half;
         let center = map.point((min + max) * 0.5);
-        // Rounding of the box, and of a ray moved into the box's own space, which is some roundings of the size there and
-        // comes back multiplied by the map, both in f64; exact maps keep exact boxes.
+        // Rounding of the box, and of a ray moved into the box's own space, which is some roundings of the size there
+        // and comes back multiplied by the map, both in f64; exact maps keep exact boxes.
         let size = center.abs() + reach;
         let back = m.abs() * (map.inverse().linear().abs() * size);
         let slack = if exact(m) { 0.0 } else { 32.0 * f64::EPSILON };

@@ -5,17 +5,18 @@ use rt_geom::glam::DVec3;
 use rt_geom::{Motion, Path};
 
 impl Aabb {
-    /// A box around everything that `motion` carries this one through between two times, in `[0, 1]` (what is beyond is cut off, NaN
-    /// opens that end), given relative to `origin` and rounded outward, and grown as by [`Aabb::transformed`].
+    /// A box around everything that `motion` carries this one through between two times, in `[0, 1]` (what is beyond is
+    /// cut off, NaN opens that end), given relative to `origin` and rounded outward, and grown as by
+    /// [`Aabb::transformed`].
     ///
-    /// Neither a sample of times nor the boxes at both ends are enough: a turning corner swings out between them. Each coordinate of
-    /// each corner is a known function of time, and its extremes are enclosed by interval Newton steps. The box fits the curves
-    /// within `2^-34` of their size, and so within the rounding to `f32`.
+    /// Neither a sample of times nor the boxes at both ends are enough: a turning corner swings out between them. Each
+    /// coordinate of each corner is a known function of time, and its extremes are enclosed by interval Newton steps.
+    /// The box fits the curves within `2^-34` of their size, and so within the rounding to `f32`.
     ///
     /// Cost: some tens of microseconds where there is rotation.
     ///
-    /// Source: Pharr, Jakob, Humphreys, *Physically Based Rendering*, 3rd ed. (2016), section 2.9.4; Moore, *Interval Analysis*
-    /// (1966).
+    /// Source: Pharr, Jakob, Humphreys, *Physically Based Rendering*, 3rd ed. (2016), section 2.9.4; Moore, *Interval
+    /// Analysis* (1966).
     ///
     /// ```
     /// use rt_bounds::Aabb;
@@ -147,7 +148,7 @@ impl Curve {
             let x = self.at(middle);
             let off = rate.size() * (t.1 - t.0) * 0.5;
             // As near as is needed; or as near as times can be told apart; or not a number.
-            if !(off > fine) || middle <= t.0 || middle >= t.1 {
+            if off <= fine || off.is_nan() || middle <= t.0 || middle >= t.1 {
                 (lo, hi) = (lo.min(x - off), hi.max(x + off));
                 if off.is_nan() {
                     return [f64::NAN; 2];

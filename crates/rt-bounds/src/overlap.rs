@@ -6,14 +6,15 @@ use rt_geom::{Beam, Cone, unit};
 
 /// A cone made ready, once, to be tested against boxes.
 ///
-/// Never misses a box that meets the exact cone. Says *met* wrongly only within `64 u` of the distance between the cone's origin and
-/// the far side of the box, `u = 2^-53`, and for boxes that are infinite (where it may say *met* always, except that a cone of finite
-/// length is as exact as ever). Empty and invalid boxes meet nothing.
+/// Never misses a box that meets the exact cone. Says *met* wrongly only within `64 u` of the distance between the
+/// cone's origin and the far side of the box, `u = 2^-53`, and for boxes that are infinite (where it may say *met*
+/// always, except that a cone of finite length is as exact as ever). Empty and invalid boxes meet nothing.
 ///
-/// How far a point lies outside the mantle is a convex function up to a right angle, so its least value over the box, cut to
-/// the cone's range, is taken where the axis pierces a face or somewhere on an edge, in closed form; beyond a right angle the function is
-/// concave and the corners tell. All of it is written so that what is computed is right for a cone and a range that differ by some
-/// roundings from the given one, and so differs by no more than the `64 u` that are added.
+/// How far a point lies outside the mantle is a convex function up to a right angle, so its least value over the box,
+/// cut to the cone's range, is taken where the axis pierces a face or somewhere on an edge, in closed form; beyond a
+/// right angle the function is concave and the corners tell. All of it is written so that what is computed is right for
+/// a cone and a range that differ by some roundings from the given one, and so differs by no more than the `64 u` that
+/// are added.
 ///
 /// Cost: most boxes are decided by their middle (some 10 ns); the others by up to 12 edges (some 100 ns).
 ///
@@ -42,8 +43,8 @@ struct EdgeKind {
     across: DVec3,
     /// Its squared length.
     across2: f64,
-    /// From the point of an edge nearest to the axis to where it is least outside, in units of the distance there; infinite where the
-    /// edge only gets deeper.
+    /// From the point of an edge nearest to the axis to where it is least outside, in units of the distance there;
+    /// infinite where the edge only gets deeper.
     lead: f64,
 }
 
@@ -100,8 +101,8 @@ impl ConeTest {
         if outside > half.length() + slack {
             return false;
         }
-        // NaN, from beyond the range of f64, counts as met.
-        let inside = |p: DVec3| !(self.cone.outside(p) > slack);
+        let inside = |p: DVec3| self.cone.outside(p) <= slack;
+        // From beyond the range of f64.
         if !(outside.is_finite() && slack.is_finite()) {
             return true;
         }
@@ -161,8 +162,8 @@ impl ConeTest {
         (first <= last).then_some(last)
     }
 
-    /// Whether the disc of the cone at distance `t` meets the outline of the section of the box there: for each face, the point of
-    /// the section's edge nearest to the axis.
+    /// Whether the disc of the cone at distance `t` meets the outline of the section of the box there: for each face,
+    /// the point of the section's edge nearest to the axis.
     fn section(&self, t: f64, lo: DVec3, hi: DVec3, inside: &impl Fn(DVec3) -> bool) -> bool {
         let axis = self.cone.axis();
         let center = axis * t;
@@ -225,16 +226,17 @@ impl EdgeKind {
 
 /// A beam made ready, once, to be tested against boxes.
 ///
-/// Never misses a box that meets the exact beam, the set between its [corner rays](Beam::corners). Says *met* wrongly only within
-/// some `32 u` of the distances involved. Empty and invalid boxes meet nothing.
+/// Never misses a box that meets the exact beam, the set between its [corner rays](Beam::corners). Says *met* wrongly
+/// only within some `32 u` of the distances involved. Empty and invalid boxes meet nothing.
 ///
-/// By separating directions, which are all tried: of the faces of both, and across each pair of edges. First the beam is cut to the
-/// depths of the box, so that no direction is spoilt by what happens to its rounding far away.
+/// By separating directions, which are all tried: of the faces of both, and across each pair of edges. First the beam
+/// is cut to the depths of the box, so that no direction is spoilt by what happens to its rounding far away.
 ///
-/// Cost: two dot products a direction, up to some 40 for a beam of four sides; most boxes are decided within the first 8.
+/// Cost: two dot products a direction, up to some 40 for a beam of four sides; most boxes are decided within the first
+/// 8.
 ///
-/// Source: Gottschalk, *Separating axis theorem* (1996); the choice of directions after Greene, "Detecting intersection of a
-/// rectangular solid and a convex polyhedron", Graphics Gems IV (1994), which tries fewer of them.
+/// Source: Gottschalk, *Separating axis theorem* (1996); the choice of directions after Greene, "Detecting intersection
+/// of a rectangular solid and a convex polyhedron", Graphics Gems IV (1994), which tries fewer of them.
 ///
 /// ```
 /// use rt_bounds::{Aabb, BeamTest};

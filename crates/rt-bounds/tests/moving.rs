@@ -2,6 +2,8 @@
 //!
 //! `RT_CASES=100` asks a hundred times as many.
 
+#![allow(clippy::print_stdout)] // Figures, for `--nocapture`.
+
 use rt_bounds::Aabb;
 use rt_geom::glam::{BVec3, DAffine3, DMat3, DVec3, Vec3A};
 use rt_geom::{Motion, Transform};
@@ -133,7 +135,8 @@ fn clipped_rays_corners_and_distances() {
             seeded.inside(b.min.as_dvec3(), b.max.as_dvec3()),
         );
         let ray = rt_geom::Ray::new(o, p - o);
-        // The exact line passes within the rounding of p - o of a point of the flat box: so it must meet a slightly grown one.
+        // The exact line passes within the rounding of p - o of a point of the flat box: so it must meet a slightly
+        // grown one.
         let grown = Aabb::new(b.min - 1e-6, b.max + 1e-6);
         let [enter, leave] = grown.clip(&ray).unwrap();
         assert!(enter <= 1.0 && 1.0 <= leave && leave - enter < 10.0 / (p - o).length());

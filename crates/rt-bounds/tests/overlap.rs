@@ -2,6 +2,8 @@
 //!
 //! `RT_CASES=100` asks a hundred times as many.
 
+#![allow(clippy::print_stdout)] // Figures, for `--nocapture`.
+
 use rt_bounds::{Aabb, BeamTest, ConeTest};
 use rt_geom::glam::{DMat3, DQuat, DVec3, Vec3A};
 use rt_geom::{Beam, Cone, Ray};
@@ -12,7 +14,8 @@ fn cases(usual: usize) -> usize {
     usual * std::env::var("RT_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(1)
 }
 
-/// The least value over a box of a convex function, by nested ternary searches: slow, and sharing nothing with what it judges.
+/// The least value over a box of a convex function, by nested ternary searches: slow, and sharing nothing with what it
+/// judges.
 fn least(lo: DVec3, hi: DVec3, f: &dyn Fn(DVec3) -> f64) -> f64 {
     fn search(axis: usize, p: DVec3, lo: DVec3, hi: DVec3, f: &dyn Fn(DVec3) -> f64) -> f64 {
         if axis == 3 {

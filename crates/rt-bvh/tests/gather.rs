@@ -1,5 +1,7 @@
 //! Wide rays through a tree: what a cone or a beam meets is gathered, and little else is.
 
+#![allow(clippy::print_stdout)] // Figures, for `--nocapture`.
+
 use rt_accel::{Bounded, Exhaustive, Structure};
 use rt_bounds::{Aabb, BeamTest, ConeTest};
 use rt_bvh::{Bvh, BvhParams};

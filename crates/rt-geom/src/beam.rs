@@ -4,12 +4,12 @@ use crate::{Ray, Transform, unit};
 use core::fmt;
 use glam::DVec3;
 
-/// The rays from an apex through a convex polygon, or through it in one direction, between two depths: a closed convex set
-/// between planes.
+/// The rays from an apex through a convex polygon, or through it in one direction, between two depths: a closed convex
+/// set between planes.
 ///
-/// It is kept as its corner rays, which share a parameter: the depth, measured across the polygon's plane from the apex, or along
-/// the direction from its first corner. So the cross-sections at equal depths are parallel polygons, and the beam is all that lies
-/// between its corners at equal depths.
+/// It is kept as its corner rays, which share a parameter: the depth, measured across the polygon's plane from the
+/// apex, or along the direction from its first corner. So the cross-sections at equal depths are parallel polygons, and
+/// the beam is all that lies between its corners at equal depths.
 ///
 /// Source: Heckbert and Hanrahan, "Beam tracing polygonal objects" (1984).
 ///
@@ -36,8 +36,8 @@ pub struct Beam {
 pub enum BeamError {
     /// A coordinate is not finite, or the beam leaves the range of `f64`.
     NotFinite,
-    /// The polygon has no area as the beam sees it, or neighbouring corners coincide, or there are fewer than three, or the apex is
-    /// in its plane or between its corners.
+    /// The polygon has no area as the beam sees it, or neighbouring corners coincide, or there are fewer than three, or
+    /// the apex is in its plane or between its corners.
     Flat,
     /// The polygon is not convex, or its corners are not in order.
     NotConvex,
@@ -56,8 +56,8 @@ impl fmt::Display for BeamError {
 impl core::error::Error for BeamError {}
 
 impl Beam {
-    /// The rays from `apex` through a convex polygon, whose corners are in either order, at any depth ahead of the apex.
-    /// A polygon that is not plane is met by the same corner rays.
+    /// The rays from `apex` through a convex polygon, whose corners are in either order, at any depth ahead of the
+    /// apex. A polygon that is not plane is met by the same corner rays.
     ///
     /// # Errors
     ///
@@ -68,14 +68,14 @@ impl Beam {
         // On the side where the polygon is, so that depths grow towards it.
         let depth = if arms[0].dot(plane) < 0.0 { -plane } else { plane };
         let corners: Vec<_> = arms.iter().map(|&arm| Ray::new(apex, arm / arm.dot(depth))).collect();
-        if arms.iter().any(|arm| !(arm.dot(depth) > 0.0)) {
+        if !arms.iter().all(|arm| arm.dot(depth) > 0.0) {
             return Err(BeamError::Flat);
         }
         Beam::checked(corners, depth)
     }
 
-    /// What comes from a convex polygon, whose corners are in either order, in the direction `dir`: at any depth from the
-    /// plane across `dir` through the first corner.
+    /// What comes from a convex polygon, whose corners are in either order, in the direction `dir`: at any depth from
+    /// the plane across `dir` through the first corner.
     ///
     /// # Errors
     ///
@@ -107,9 +107,11 @@ impl Beam {
         let mut normals = Vec::with_capacity(n);
         for i in 0..n {
             let (a, b) = (sections[i], sections[(i + 1) % n]);
-            // In the parallel beam a and b differ by the edge, in the other one the edge spans the same plane with either arm.
+            // In the parallel beam a and b differ by the edge, in the other one the edge spans the same plane with
+            // either arm.
             let normal = unit((b - a).cross(corners[i].dir)).ok_or(BeamError::Flat)?;
-            // Corners that are meant to lie in one plane may be off by the rounding of the cross product and of the sections.
+            // Corners that are meant to lie in one plane may be off by the rounding of the cross product and of the
+            // sections.
             let size = sections.iter().fold(0.0f64, |m, s| m.max(s.length()));
             if sections.iter().any(|&s| normal.dot(s - a) > size * (32.0 * f64::EPSILON)) {
                 return Err(BeamError::NotConvex);
@@ -119,7 +121,8 @@ impl Beam {
         Ok(Beam { corners, normals, depth })
     }
 
-    /// The same beam between two depths, `near` and `far` included. A `near` below 0 is 0; NaN leaves an end where it is.
+    /// The same beam between two depths, `near` and `far` included. A `near` below 0 is 0; NaN leaves an end where it
+    /// is.
     pub fn between(mut self, near: f64, far: f64) -> Beam {
         for corner in &mut self.corners {
             corner.t_min = if near.is_nan() { corner.t_min } else { near.max(0.0) };
@@ -128,7 +131,8 @@ impl Beam {
         self
     }
 
-    /// The corner rays: `t` is the depth, and its interval the depths of the beam. Counter-clockwise seen against the beam.
+    /// The corner rays: `t` is the depth, and its interval the depths of the beam. Counter-clockwise seen against the
+    /// beam.
     pub fn corners(&self) -> &[Ray<f64>] {
         &self.corners
     }
@@ -138,8 +142,8 @@ impl Beam {
         self.normals.iter().zip(&self.corners).map(|(&n, c)| (n, c.origin))
     }
 
-    /// The covector of the depth: a point has the depth `depth . (p - origin)`, for the origin of any corner. Unit until the beam is
-    /// carried by a map.
+    /// The covector of the depth: a point has the depth `depth . (p - origin)`, for the origin of any corner. Unit
+    /// until the beam is carried by a map.
     pub fn depth(&self) -> DVec3 {
         self.depth
     }

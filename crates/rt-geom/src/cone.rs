@@ -7,9 +7,9 @@ use glam::DVec3;
 
 /// The points within an angle of an axis, or within a radius that grows evenly along it, between two distances.
 ///
-/// With `t` the distance of a point along the axis from the origin and `D` its distance from the axis, the solid, closed set
-/// `D cos(angle) <= t sin(angle) + radius cos(angle)`, `near <= t <= far`. So a cone of angle 0 is a ray or a cylinder, one of a right
-/// angle a half space, and a wider one all but a cone the other way.
+/// With `t` the distance of a point along the axis from the origin and `D` its distance from the axis, the solid,
+/// closed set `D cos(angle) <= t sin(angle) + radius cos(angle)`, `near <= t <= far`. So a cone of angle 0 is a ray or
+/// a cylinder, one of a right angle a half space, and a wider one all but a cone the other way.
 ///
 /// Source: Amanatides, "Ray tracing with cones" (1984).
 ///
@@ -57,8 +57,8 @@ impl fmt::Display for ConeError {
 impl core::error::Error for ConeError {}
 
 impl Cone {
-    /// The points seen from `apex` within `half_angle`, in `[0, pi]`, of `axis`, which need not be unit. At any distance: ahead
-    /// of the apex up to a right angle, on both sides beyond.
+    /// The points seen from `apex` within `half_angle`, in `[0, pi]`, of `axis`, which need not be unit. At any
+    /// distance: ahead of the apex up to a right angle, on both sides beyond.
     ///
     /// # Errors
     ///
@@ -78,9 +78,9 @@ impl Cone {
         Ok(Cone { origin: apex, axis, sin, cos, radius: 0.0, near, far: f64::INFINITY })
     }
 
-    /// What lies within `radius + spread * distance` of a ray, for distances (not lengths of its direction) along it from its
-    /// `t_min`, but not before its origin, to its `t_max`: a ray with the width of a pixel. The apex is virtual, behind the
-    /// origin.
+    /// What lies within `radius + spread * distance` of a ray, for distances (not lengths of its direction) along it
+    /// from its `t_min`, but not before its origin, to its `t_max`: a ray with the width of a pixel. The apex is
+    /// virtual, behind the origin.
     ///
     /// # Errors
     ///
@@ -136,8 +136,8 @@ impl Cone {
         if self.cos > 0.0 { self.radius + distance * (self.sin / self.cos) } else { f64::INFINITY }
     }
 
-    /// How far a point, given relative to the origin, lies outside the mantle, negative inside: its distance from the mantle,
-    /// except behind the apex, where it may be farther. Changes by no more than the point moves.
+    /// How far a point, given relative to the origin, lies outside the mantle, negative inside: its distance from the
+    /// mantle, except behind the apex, where it may be farther. Changes by no more than the point moves.
     ///
     /// Error: at most `16 u` times the length of `p`, plus the radius.
     #[inline]

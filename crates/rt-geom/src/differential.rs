@@ -5,14 +5,14 @@ use glam::{DVec2, DVec3};
 
 /// The derivatives of a ray's origin and direction by the two image coordinates, carried beside the ray, in `f64`.
 ///
-/// In units of one sample: a pixel, unless [scaled](RayDifferential::scaled). The direction is differentiated as it stands,
-/// unit or not, together with the `t` that counts its lengths. Where derivatives are not known there is none of
+/// In units of one sample: a pixel, unless [scaled](RayDifferential::scaled). The direction is differentiated as it
+/// stands, unit or not, together with the `t` that counts its lengths. Where derivatives are not known there is none of
 /// these: an `Option` of the caller, never zeros, which would claim a ray without width.
 ///
-/// At a hit: [`RayDifferential::footprint`] gives the size of the sample on the surface; [`Footprint::parameters`] the same in the
-/// surface's parameters, from which follows how the normal turns; then [`RayDifferential::reflected`] or
-/// [`RayDifferential::refracted`] start the next ray. These are derivatives, exact to first order: for mirrors and windows that are
-/// plane, finite differences of rays equal them only as far as the image itself is linear.
+/// At a hit: [`RayDifferential::footprint`] gives the size of the sample on the surface; [`Footprint::parameters`] the
+/// same in the surface's parameters, from which follows how the normal turns; then [`RayDifferential::reflected`] or
+/// [`RayDifferential::refracted`] start the next ray. These are derivatives, exact to first order: for mirrors and
+/// windows that are plane, finite differences of rays equal them only as far as the image itself is linear.
 ///
 /// Source: Igehy, "Tracing ray differentials" (1999).
 ///
@@ -42,8 +42,8 @@ pub struct Footprint {
 }
 
 impl RayDifferential {
-    /// The differences of the rays of the next sample to the right and of the next one below to this one: derivatives, where the image
-    /// is linear in between.
+    /// The differences of the rays of the next sample to the right and of the next one below to this one: derivatives,
+    /// where the image is linear in between.
     pub fn between<R: Real>(ray: &Ray<R>, right: &Ray<R>, below: &Ray<R>) -> RayDifferential {
         let next = [right, below];
         RayDifferential {
@@ -57,8 +57,8 @@ impl RayDifferential {
         RayDifferential { origin: self.origin.map(|v| v * by), dir: self.dir.map(|v| v * by) }
     }
 
-    /// What the sample covers on a surface met at `t` with the normal `normal`, of any length and on either side; `None` when the
-    /// ray grazes the surface, where it covers all of it.
+    /// What the sample covers on a surface met at `t` with the normal `normal`, of any length and on either side;
+    /// `None` when the ray grazes the surface, where it covers all of it.
     pub fn footprint(&self, ray: &Ray<f64>, t: f64, normal: DVec3) -> Option<Footprint> {
         let across = ray.dir.dot(normal);
         let points = [0, 1].map(|i| {
@@ -68,8 +68,8 @@ impl RayDifferential {
         (points[0].is_finite() && points[1].is_finite()).then_some(Footprint { points })
     }
 
-    /// The direction of the mirrored ray, as long as `dir`, and its differential. `normal` is unit, on either side, and `bend` how it
-    /// changes by image x and image y: zero on a plane.
+    /// The direction of the mirrored ray, as long as `dir`, and its differential. `normal` is unit, on either side, and
+    /// `bend` how it changes by image x and image y: zero on a plane.
     pub fn reflected(
         &self,
         dir: DVec3,
@@ -85,9 +85,9 @@ impl RayDifferential {
         (dir - normal * (2.0 * along), RayDifferential { origin: at.points, dir: turned })
     }
 
-    /// The direction of the refracted ray, unit whatever the length of `dir`, and its differential; `None` where all light is
-    /// reflected or the direction is zero. `normal` is unit, on either side, and `bend` how it changes by image x and image
-    /// y. `index` is the index of refraction where the ray comes from over that where it goes.
+    /// The direction of the refracted ray, unit whatever the length of `dir`, and its differential; `None` where all
+    /// light is reflected or the direction is zero. `normal` is unit, on either side, and `bend` how it changes by
+    /// image x and image y. `index` is the index of refraction where the ray comes from over that where it goes.
     pub fn refracted(
         &self,
         dir: DVec3,
@@ -106,7 +106,7 @@ impl RayDifferential {
         let along = d.dot(normal);
         // 1 - sin^2 of the refracted angle, the sine by the cross product so that it is right near the normal.
         let inside = 1.0 - index * index * d.cross(normal).length_squared();
-        if !(inside > 0.0) {
+        if inside <= 0.0 || inside.is_nan() {
             return None;
         }
         let leaving = -inside.sqrt();
@@ -126,8 +126,9 @@ impl RayDifferential {
 }
 
 impl Footprint {
-    /// The change of the surface's parameters `(u, v)` by image x and image y, where the surface goes by `dpdu` and `dpdv`: by
-    /// least squares, so that tangents off the footprint's plane do not matter. `None` where the tangents do not span a plane.
+    /// The change of the surface's parameters `(u, v)` by image x and image y, where the surface goes by `dpdu` and
+    /// `dpdv`: by least squares, so that tangents off the footprint's plane do not matter. `None` where the tangents do
+    /// not span a plane.
     ///
     /// With the derivatives `dndu` and `dndv` of the unit normal, the normal changes by `dndu * du + dndv * dv`.
     ///

@@ -14,8 +14,8 @@ pub(crate) struct Inverted {
     pub(crate) matrix: DMat3,
     /// Each entry within `u (1 + 2^-40)` of the exact one, relatively, or half the least number absolutely.
     pub(crate) inverse: DMat3,
-    /// The condition of the matrix when its rows and columns are brought to size 1: no stretch along the axes of either side
-    /// counts. Roundings of the entries can make the matrix singular only if this exceeds `1 / u`.
+    /// The condition of the matrix when its rows and columns are brought to size 1: no stretch along the axes of either
+    /// side counts. Roundings of the entries can make the matrix singular only if this exceeds `1 / u`.
     pub(crate) condition: f64,
 }
 

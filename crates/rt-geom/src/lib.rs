@@ -1,4 +1,5 @@
-//! Rays, cones and beams, transforms, and the rounding rules they obey: what is true of numbers, rays and maps when there is nothing to hit.
+//! Rays, cones and beams, transforms, and the rounding rules they obey: what is true of numbers, rays and maps when
+//! there is nothing to hit.
 //!
 //! # Conventions
 //!

@@ -4,12 +4,12 @@ use crate::invert::invert;
 use crate::{Parts, Transform, TransformError};
 use glam::{DMat3, DQuat, DVec3};
 
-/// The way from one transform at time 0 to another at time 1: translation and stretch go straight, the rotation turns the
-/// shorter way at constant speed.
+/// The way from one transform at time 0 to another at time 1: translation and stretch go straight, the rotation turns
+/// the shorter way at constant speed.
 ///
-/// Both ends are kept as they were given. In between the map is `T(time) R(time) S(time)`, the parts of [`Parts`]; it can be inverted
-/// at every time, because stretches between two positive ones are positive. Between opposite poses of one axis both ways
-/// are equally short, and rounding picks one.
+/// Both ends are kept as they were given. In between the map is `T(time) R(time) S(time)`, the parts of [`Parts`]; it
+/// can be inverted at every time, because stretches between two positive ones are positive. Between opposite poses of
+/// one axis both ways are equally short, and rounding picks one.
 ///
 /// Source: Shoemake, "Animating rotation with quaternion curves" (1985); Shoemake and Duff, "Matrix animation and polar
 /// decomposition" (1992).
@@ -40,8 +40,9 @@ impl Motion {
     ///
     /// # Errors
     ///
-    /// [`TransformError::Mirrors`] when one of them swaps handedness and the other does not. [`TransformError::Singular`] when
-    /// their stretches differ so that something between may have a condition above [`Transform::MAX_CONDITION`].
+    /// [`TransformError::Mirrors`] when one of them swaps handedness and the other does not.
+    /// [`TransformError::Singular`] when their stretches differ so that something between may have a condition above
+    /// [`Transform::MAX_CONDITION`].
     pub fn new(start: Transform, end: Transform) -> Result<Motion, TransformError> {
         if start.swaps_handedness() != end.swaps_handedness() {
             return Err(TransformError::Mirrors);
@@ -59,7 +60,7 @@ impl Motion {
         let size = frobenius(from.stretch).max(frobenius(to.stretch));
         let back = frobenius(invert(from.stretch)?.inverse).max(frobenius(invert(to.stretch)?.inverse));
         let condition = size * back;
-        if !(condition <= Transform::MAX_CONDITION) {
+        if condition > Transform::MAX_CONDITION || condition.is_nan() {
             return Err(TransformError::Singular { condition });
         }
         Ok(Motion { start, end, from, to, half_angle, across, condition })
@@ -67,12 +68,13 @@ impl Motion {
 
     /// The transform at a time between 0 and 1. Earlier times are 0, later ones 1, and NaN is 0.
     ///
-    /// Error: a point is carried within `64 u` of the size of the terms it is the sum of. Cost: one inversion, about a microsecond.
+    /// Error: a point is carried within `64 u` of the size of the terms it is the sum of. Cost: one inversion, about a
+    /// microsecond.
     pub fn at(&self, time: f64) -> Transform {
         if time >= 1.0 {
             return self.end;
         }
-        if !(time > 0.0) {
+        if time <= 0.0 || time.is_nan() {
             return self.start;
         }
         let (sin, cos) = (self.half_angle * time).sin_cos();

@@ -4,8 +4,8 @@ use crate::{Transform, TransformError, unit};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 impl Transform {
-    /// Turns by `angle` radians about `axis`, counter-clockwise seen against it, within some 4 roundings. `axis` need not be
-    /// unit.
+    /// Turns by `angle` radians about `axis`, counter-clockwise seen against it, within some 4 roundings. `axis` need
+    /// not be unit.
     ///
     /// # Errors
     ///
@@ -49,13 +49,13 @@ impl Transform {
         Transform::new(DAffine3::from_mat3(DMat3::from_quat(scaled.normalize())))
     }
 
-    /// The rotation that takes the direction `from` to the direction `to`, neither of which need be unit: the least one, except that
-    /// opposite directions leave the axis open.
+    /// The rotation that takes the direction `from` to the direction `to`, neither of which need be unit: the least
+    /// one, except that opposite directions leave the axis open.
     ///
     /// The product of two reflections by way of a third direction, which no pair of directions makes unstable.
     ///
-    /// Source: Möller and Hughes, "Efficiently building a matrix to rotate one vector to another", Journal of Graphics Tools 4(4)
-    /// (1999).
+    /// Source: Möller and Hughes, "Efficiently building a matrix to rotate one vector to another", Journal of Graphics
+    /// Tools 4(4) (1999).
     ///
     /// # Errors
     ///
@@ -89,8 +89,8 @@ impl Transform {
         Transform::new(DAffine3::from_mat3(linear))
     }
 
-    /// Places an object at `eye` so that its `+z` axis points to `target` and its `+y` axis as nearly `up` as can be; its `+x`
-    /// is to its left. From object space to the world; nothing is mirrored.
+    /// Places an object at `eye` so that its `+z` axis points to `target` and its `+y` axis as nearly `up` as can be;
+    /// its `+x` is to its left. From object space to the world; nothing is mirrored.
     ///
     /// # Errors
     ///
@@ -113,8 +113,8 @@ impl Transform {
         Transform::new(DAffine3 { matrix3: DMat3::from_cols(x, z.cross(x), z), translation: eye })
     }
 
-    /// From the world to the space of a camera at `eye` that looks at `target`: `x` to its right, `y` up, and what it sees at
-    /// negative `z`. The inverse places the camera in the world. Nothing is mirrored.
+    /// From the world to the space of a camera at `eye` that looks at `target`: `x` to its right, `y` up, and what it
+    /// sees at negative `z`. The inverse places the camera in the world. Nothing is mirrored.
     ///
     /// # Errors
     ///
@@ -126,7 +126,8 @@ impl Transform {
     /// assert_eq!(view.point(DVec3::new(1.0, 5.0, 2.0)), DVec3::new(1.0, 2.0, -5.0));
     /// ```
     pub fn look_at_camera(eye: DVec3, target: DVec3, up: DVec3) -> Result<Transform, TransformError> {
-        let about = Transform::scale(DVec3::new(-1.0, 1.0, -1.0))?; // a half turn about y: the object's front is the camera's back
+        // A half turn about y: the object's front is the camera's back.
+        let about = Transform::scale(DVec3::new(-1.0, 1.0, -1.0))?;
         Ok(about.then(&Transform::look_at_object(eye, target, up)?)?.inverse())
     }
 }

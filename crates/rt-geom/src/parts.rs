@@ -6,12 +6,12 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 /// A transform taken apart by polar decomposition: a point is stretched, then turned, then moved, `p -> R (S p) + t`.
 ///
-/// The stretch is symmetric; its eigenvalues are the factors along its own three axes, all positive, or all negative where
-/// the map mirrors. Of all rotations, `R` is the nearest to the linear part, so that what is between two transforms taken
-/// apart so looks as if it moved rigidly.
+/// The stretch is symmetric; its eigenvalues are the factors along its own three axes, all positive, or all negative
+/// where the map mirrors. Of all rotations, `R` is the nearest to the linear part, so that what is between two
+/// transforms taken apart so looks as if it moved rigidly.
 ///
-/// Error: the parts make the map again within some 16 roundings of its largest entry. The rotation itself is as uncertain as its
-/// question: by `u` times the largest stretch over the sum of the two smallest.
+/// Error: the parts make the map again within some 16 roundings of its largest entry. The rotation itself is as
+/// uncertain as its question: by `u` times the largest stretch over the sum of the two smallest.
 ///
 /// Source: Shoemake and Duff, "Matrix animation and polar decomposition" (1992); scaled by Higham, "Computing the polar
 /// decomposition - with applications" (1986).
@@ -33,7 +33,8 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Takes `map` apart. Cost: some ten inversions, about ten microseconds; a thousand for stretches near the range of `f64`.
+    /// Takes `map` apart. Cost: some ten inversions, about ten microseconds; a thousand for stretches near the range of
+    /// `f64`.
     pub fn of(map: &Transform) -> Parts {
         let affine = map.affine();
         let m = affine.matrix3;

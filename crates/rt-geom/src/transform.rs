@@ -8,15 +8,15 @@ use glam::{DAffine3, DMat3, DVec3};
 
 /// An affine map of space, kept with its inverse, in `f64` whatever the precision of the rays it moves.
 ///
-/// Points go to `A (p + a) + b`, vectors to `A v`, normals to `A^-T n`. A map made from a matrix has `a = 0`; its inverse is
-/// `A^-1 (p - b)`, which does not cancel where `A^-1 p - A^-1 b` does.
+/// Points go to `A (p + a) + b`, vectors to `A v`, normals to `A^-T n`. A map made from a matrix has `a = 0`; its
+/// inverse is `A^-1 (p - b)`, which does not cancel where `A^-1 p - A^-1 b` does.
 ///
 /// `f64` because with a stretch of `1e8` an inverse in `f32` misses four hits in five.
 ///
-/// Error: the inverse is computed exactly and rounded once, so that each of its entries is right to the last digit, whatever the
-/// stretch. Hence a point carried either way is off by a few roundings of the terms of its sum, `|A| |p + a| + |b|`, never by
-/// the condition of `A`: see [`Transform::point_with_error`]. There and back, a point keeps all but `log2(condition)` of
-/// its bits.
+/// Error: the inverse is computed exactly and rounded once, so that each of its entries is right to the last digit,
+/// whatever the stretch. Hence a point carried either way is off by a few roundings of the terms of its sum, `|A| |p +
+/// a| + |b|`, never by the condition of `A`: see [`Transform::point_with_error`]. There and back, a point keeps all but
+/// `log2(condition)` of its bits.
 ///
 /// ```
 /// use rt_geom::{Transform, glam::DVec3};
@@ -88,15 +88,16 @@ impl Transform {
         after: DVec3::ZERO,
     };
 
-    /// The greatest condition a linear part may have, after its rows and columns were brought to size 1: stretches along the axes
-    /// of either side are free, however large; turned both before and after, a stretch may be up to about `1 : 1e12`.
+    /// The greatest condition a linear part may have, after its rows and columns were brought to size 1: stretches
+    /// along the axes of either side are free, however large; turned both before and after, a stretch may be up to
+    /// about `1 : 1e12`.
     ///
-    /// The entries of a matrix are rounded numbers. Beyond `1 / u`, about `1e16`, that rounding alone can make it singular, and at
-    /// `1e12` it leaves three or four digits of the inverse: less than any picture needs.
+    /// The entries of a matrix are rounded numbers. Beyond `1 / u`, about `1e16`, that rounding alone can make it
+    /// singular, and at `1e12` it leaves three or four digits of the inverse: less than any picture needs.
     pub const MAX_CONDITION: f64 = 1e12;
 
-    /// The map `p -> A p + b` of an affine matrix. Entries of `A` below `2^-300` of both their row and their column count as
-    /// zero. Cost: about a microsecond, for the inverse is exact but for its one rounding.
+    /// The map `p -> A p + b` of an affine matrix. Entries of `A` below `2^-300` of both their row and their column
+    /// count as zero. Cost: about a microsecond, for the inverse is exact but for its one rounding.
     ///
     /// # Errors
     ///
@@ -132,10 +133,10 @@ impl Transform {
 
     /// First `self`, then `next`.
     ///
-    /// The product is computed with twice the digits and rounded once, and inverted anew: so however many maps are composed, the
-    /// inverse fits the map to the last digit, and the map itself is off by one rounding a step. A translation between the
-    /// two is moved to the outer side that has none yet, so that a way back (`A^-1 (p - b)`) followed by another stays one,
-    /// and does not begin to cancel.
+    /// The product is computed with twice the digits and rounded once, and inverted anew: so however many maps are
+    /// composed, the inverse fits the map to the last digit, and the map itself is off by one rounding a step. A
+    /// translation between the two is moved to the outer side that has none yet, so that a way back (`A^-1 (p - b)`)
+    /// followed by another stays one, and does not begin to cancel.
     ///
     /// # Errors
     ///
@@ -191,14 +192,14 @@ impl Transform {
         self.linear * (p + self.before) + self.after
     }
 
-    /// A point known within `error`, component by component, carried over: the result, and how far it may be from where the
-    /// exact map takes the exact point, component by component. On the way back the exact map is the inverse of the forward
-    /// one, not of its rounding. Infinite where the result is not finite.
+    /// A point known within `error`, component by component, carried over: the result, and how far it may be from where
+    /// the exact map takes the exact point, component by component. On the way back the exact map is the inverse of the
+    /// forward one, not of its rounding. Infinite where the result is not finite.
     ///
-    /// With `l` the entries of the matrix at hand and `s = fl(p + a)`, the bound is
-    /// `gamma(7) (|l| |s| + |b|) + (1 + gamma(7)) |l| error`: each term of the sum carries the rounding of `l` if that is an
-    /// inverse, of `s`, of the product and of three additions, six in all, and the seventh covers the evaluation of the bound.
-    /// Products that underflow add a few times the least number. The condition of the map does not enter.
+    /// With `l` the entries of the matrix at hand and `s = fl(p + a)`, the bound is `gamma(7) (|l| |s| + |b|) + (1 +
+    /// gamma(7)) |l| error`: each term of the sum carries the rounding of `l` if that is an inverse, of `s`, of the
+    /// product and of three additions, six in all, and the seventh covers the evaluation of the bound. Products that
+    /// underflow add a few times the least number. The condition of the map does not enter.
     ///
     /// Source: Higham, *Accuracy and Stability of Numerical Algorithms* (2002), section 3.5; Pharr, Jakob, Humphreys,
     /// *Physically Based Rendering*, 4th ed. (2023), section 6.8.
@@ -222,16 +223,16 @@ impl Transform {
         self.linear * v
     }
 
-    /// A normal carried over, not normalised: `A^-T n`, which stays perpendicular to what `n` was perpendicular to. A normal
-    /// that pointed to one side of a surface points to the same side, under reflections too; a cross product of carried
-    /// tangents does not: see [`Transform::swaps_handedness`].
+    /// A normal carried over, not normalised: `A^-T n`, which stays perpendicular to what `n` was perpendicular to. A
+    /// normal that pointed to one side of a surface points to the same side, under reflections too; a cross product of
+    /// carried tangents does not: see [`Transform::swaps_handedness`].
     #[inline]
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.inverse.transpose() * n
     }
 
-    /// The plane `n . x = d` carried over: the normal and the offset of its image. Half spaces `n . x <= d` go to half spaces
-    /// `n' . x <= d'`.
+    /// The plane `n . x = d` carried over: the normal and the offset of its image. Half spaces `n . x <= d` go to half
+    /// spaces `n' . x <= d'`.
     pub fn plane(&self, n: DVec3, d: f64) -> (DVec3, f64) {
         let normal = self.normal(n);
         (normal, d + n.dot(self.before) + normal.dot(self.after))
@@ -254,8 +255,8 @@ impl Transform {
         self.linear
     }
 
-    /// Whether the map turns right hands into left hands. Exact. A surface oriented by the order of its corners or parameters
-    /// turns its other side out when this holds.
+    /// Whether the map turns right hands into left hands. Exact. A surface oriented by the order of its corners or
+    /// parameters turns its other side out when this holds.
     pub fn swaps_handedness(&self) -> bool {
         mirrors(self.linear)
     }

@@ -103,7 +103,8 @@ fn a_ball_agrees_with_differences_of_traced_rays() {
             let d = differential();
             let t = (p - ray.origin).dot(ray.dir) / ray.dir.length_squared();
             let at = d.footprint(&ray, t, n).unwrap();
-            // The unit normal of the unit ball turns as the point moves. By way of parameters, which must come to the same.
+            // The unit normal of the unit ball turns as the point moves. By way of parameters, which must come to the
+            // same.
             let (u, v) = n.any_orthonormal_pair();
             let (u, v) = (u * 2.0, v + u * 0.3);
             let bend = at.parameters(u, v).unwrap().map(|d| u * d.x + v * d.y);

@@ -2,6 +2,8 @@
 //!
 //! `RT_CASES=100` asks a hundred times as many.
 
+#![allow(clippy::print_stdout)] // Figures, for `--nocapture`.
+
 use num_bigint::BigInt;
 use rt_geom::glam::{DAffine3, DMat3, DQuat, DVec3};
 use rt_geom::{Motion, Parts, Ray, Transform, TransformError, angle_between};
