@@ -191,7 +191,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn extremes_enclose_the_curve_and_touch_it(c in prop::array::uniform6(-3.0..3.0f64), w in 0.0..3.14159f64,
+        fn extremes_enclose_the_curve_and_touch_it(c in prop::array::uniform6(-3.0..3.0f64), w in 0.0..std::f64::consts::PI,
                                                    a in 0.0..1.0f64, b in 0.0..1.0f64) {
             let curve = Curve { fixed: c[0], linear: c[1], p: [c[2], c[3]], q: [c[4], c[5]], w };
             let (a, b) = (a.min(b), a.max(b));

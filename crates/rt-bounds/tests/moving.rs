@@ -154,7 +154,7 @@ fn clipped_rays_corners_and_distances() {
     }
     let along = rt_geom::Ray::new(Vec3A::new(-2.0, 2.0, 0.5), Vec3A::X); // in a face, along an edge, of a flat box
     let [enter, leave] = b.clip(&along).unwrap();
-    assert!(enter <= 1.0 && enter > 1.0 - 1e-15 && leave >= 3.0 && leave < 3.0 + 1e-14);
+    assert!((1.0 - 1e-15..=1.0).contains(&enter) && (3.0..3.0 + 1e-14).contains(&leave));
     assert_eq!(Aabb::INFINITE.clip(&along), Some([0.0, f64::INFINITY]));
     assert_eq!(Aabb::EMPTY.clip(&along), None);
     assert_eq!(Aabb::EMPTY.distance_squared(DVec3::ZERO), f64::INFINITY);

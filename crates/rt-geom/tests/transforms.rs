@@ -522,9 +522,12 @@ fn what_maps_cost() {
     let mut seeded = Seeded::new(23);
     let maps: Vec<Transform> = (0..256).map(|_| any_map(&mut seeded)).collect();
     let time = |name: &str, f: &dyn Fn(&Transform) -> f64| {
-        let start = std::time::Instant::now();
-        let sum: f64 = (0..20).flat_map(|_| &maps).map(f).sum();
-        println!("{name}: {} ns ({})", start.elapsed().as_nanos() / (20 * 256), sum.is_nan());
+        let least = (0..200).map(|_| {
+            let start = std::time::Instant::now();
+            let sum: f64 = maps.iter().map(f).sum();
+            start.elapsed().as_nanos() / maps.len() as u128 + sum.is_nan() as u128
+        });
+        println!("{name}: {:?} ns", least.min());
     };
     time("new", &|m| Transform::new(m.affine()).unwrap().linear().x_axis.x);
     time("then", &|m| m.then(&Transform::translation(DVec3::X)).unwrap().linear().x_axis.x);
