@@ -1,4 +1,4 @@
-//! Volumes that enclose things, and the slab test.
+//! Volumes that enclose things, and the tests of rays, cones and beams against boxes.
 //!
 //! Boxes are `f32` and always rounded outward; a ray of either precision meets them through a [`SlabRay`], which encloses the
 //! ray it is made from. So a traversal may say *hit* too often, by a few units in the last place, and never *miss* wrongly:
@@ -22,9 +22,12 @@
 //! yet, because the conservative test costs no operation more.
 
 mod aabb;
+mod moving;
+mod overlap;
 mod slab;
 mod volume;
 
 pub use aabb::Aabb;
+pub use overlap::{BeamTest, ConeTest};
 pub use slab::{BoxPair, SlabRay};
 pub use volume::BoundingVolume;
