@@ -22,9 +22,16 @@
 //! yet, because the conservative test costs no operation more.
 
 mod aabb;
+mod cloud;
+mod obb;
 mod slab;
+mod sphere;
+mod unit_ray;
 mod volume;
 
 pub use aabb::Aabb;
+pub use obb::Obb;
 pub use slab::{BoxPair, SlabRay};
+pub use sphere::{BoundingSphere, Extremes};
+pub use unit_ray::UnitRay;
 pub use volume::BoundingVolume;

@@ -1,0 +1,80 @@
+//! The least `f32` radius about a given centre, decided exactly.
+
+use super::{BoundingSphere, FAR};
+use crate::unit_ray::U;
+use rt_geom::expansion::Expansion;
+use rt_geom::glam::{DVec3, Vec3A};
+use rt_geom::{Vector, f32_above};
+
+/// Factors whose products the expansions hold exactly lie between `1 / RANGE` and `RANGE`.
+const RANGE: f64 = f64::from_bits((1023 + 300) << 52);
+
+/// The sphere about `center`, rounded to `f32`, that holds all `points` less `origin`, with the least `f32` radius that does.
+///
+/// A distance computed in `f64` is off by at most `u |p - origin| + 4 u |p - origin - c|` and settles the radius unless an `f32`
+/// lies within that error; then expansions decide. Coordinates below `2^-300` may cost one unit in the last place more.
+pub(super) fn enclose<V: Vector>(center: DVec3, points: &[V], origin: DVec3) -> BoundingSphere {
+    let c = center.as_vec3a();
+    let out_of_reach = !(c.abs().max_element() <= FAR);
+    let (mut least, mut most) = (0.0f64, 0.0f64);
+    for p in points {
+        let [low, high] = distance(p.widen(), origin, c);
+        (least, most) = (least.max(low), most.max(high));
+    }
+    let mut radius = f32_above(most);
+    if out_of_reach || !(radius <= FAR) {
+        return BoundingSphere::INFINITE;
+    }
+    let below = radius.next_down();
+    if radius > 0.0 && least <= below as f64 {
+        let fits = |p: &V| {
+            let p = p.widen();
+            distance(p, origin, c)[1] <= below as f64 || holds(p, origin, c, below)
+        };
+        if points.iter().all(fits) {
+            radius = below;
+        }
+    }
+    BoundingSphere { center: c, radius }
+}
+
+/// Bounds of the distance from `c` to `p - origin`.
+#[inline(always)]
+fn distance(p: DVec3, origin: DVec3, c: Vec3A) -> [f64; 2] {
+    let x = p - origin;
+    let q = x - c.as_dvec3();
+    let d = q.length();
+    // Squares below 2^-1022 are lost: less than 2^-500 of the distance.
+    let error = (x.length() + 5.0 * d) * (1.01 * U) + f64::from_bits((1023 - 500) << 52);
+    [d - error, d + error]
+}
+
+/// Whether `|p - origin - c| <= r`, exactly; false where a coordinate is out of the range of the expansions.
+#[cold]
+fn holds(p: DVec3, origin: DVec3, c: Vec3A, r: f32) -> bool {
+    let numbers = p.to_array().into_iter().chain(origin.to_array());
+    if numbers.into_iter().any(|x| x != 0.0 && !(1.0 / RANGE..=RANGE).contains(&x.abs())) {
+        return false;
+    }
+    let [x, y, z] = [0, 1, 2].map(|a| {
+        let q: Expansion<3> =
+            Expansion::<2>::difference(p[a], origin[a]).minus(&Expansion::<1>::new(c[a] as f64));
+        q.times::<3, 18>(&q)
+    });
+    let square: Expansion<54> = x.plus::<18, 36>(&y).plus(&z);
+    // The square of an f32 is an f64.
+    square.minus::<1, 55>(&Expansion::new(r as f64 * r as f64)).sign() <= 0
+}
+
+/// Whether the ball about `c` holds the ball about `d`, exactly: `|c - d| <= R - r`.
+pub(super) fn holds_ball(c: Vec3A, big: f32, d: Vec3A, small: f32) -> bool {
+    if small > big {
+        return false;
+    }
+    let square = |a: f32, b: f32| {
+        let q = Expansion::<2>::difference(a as f64, b as f64);
+        q.times::<2, 8>(&q)
+    };
+    let apart: Expansion<24> = square(c.x, d.x).plus::<8, 16>(&square(c.y, d.y)).plus(&square(c.z, d.z));
+    apart.minus::<8, 32>(&square(big, small)).sign() <= 0
+}
