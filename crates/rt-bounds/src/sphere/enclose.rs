@@ -4,7 +4,7 @@ use super::{BoundingSphere, FAR};
 use crate::unit_ray::U;
 use rt_geom::expansion::Expansion;
 use rt_geom::glam::{DVec3, Vec3A};
-use rt_geom::{Vector, f32_above};
+use rt_geom::{Vector, f32_above, f32_below};
 
 /// Factors whose products the expansions hold exactly lie between `1 / RANGE` and `RANGE`.
 const RANGE: f64 = f64::from_bits((1023 + 300) << 52);
@@ -12,7 +12,7 @@ const RANGE: f64 = f64::from_bits((1023 + 300) << 52);
 /// The sphere about `center`, rounded to `f32`, that holds all `points` less `origin`, with the least `f32` radius that does.
 ///
 /// A distance computed in `f64` is off by at most `u |p - origin| + 4 u |p - origin - c|` and settles the radius unless an `f32`
-/// lies within that error; then expansions decide. Coordinates below `2^-300` may cost one unit in the last place more.
+/// lies within that error; then expansions decide. Where a coordinate is not zero but below `2^-300`, the error is granted.
 pub(super) fn enclose<V: Vector>(center: DVec3, points: &[V], origin: DVec3) -> BoundingSphere {
     let c = center.as_vec3a();
     let out_of_reach = !(c.abs().max_element() <= FAR);
@@ -25,14 +25,24 @@ pub(super) fn enclose<V: Vector>(center: DVec3, points: &[V], origin: DVec3) -> 
     if out_of_reach || !(radius <= FAR) {
         return BoundingSphere::INFINITE;
     }
-    let below = radius.next_down();
-    if radius > 0.0 && least <= below as f64 {
+    // The greatest radius that is too small for certain: below it nothing needs to be tried.
+    let mut small = f32_below(least);
+    if small as f64 == least {
+        small = small.next_down();
+    }
+    while small.next_up() < radius {
+        // Half way in units in the last place: mostly one step, more only where points coincide but for rounding.
+        let tried = match small < 0.0 {
+            true => 0.0,
+            false => f32::from_bits(small.to_bits() + (radius.to_bits() - small.to_bits()) / 2),
+        };
         let fits = |p: &V| {
             let p = p.widen();
-            distance(p, origin, c)[1] <= below as f64 || holds(p, origin, c, below)
+            distance(p, origin, c)[1] <= tried as f64 || holds(p, origin, c, tried)
         };
-        if points.iter().all(fits) {
-            radius = below;
+        match points.iter().all(fits) {
+            true => radius = tried,
+            false => small = tried,
         }
     }
     BoundingSphere { center: c, radius }
