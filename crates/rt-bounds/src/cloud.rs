@@ -66,20 +66,21 @@ impl Cloud {
 
 /// The first points farthest back and farthest ahead along each direction, as numbers of points, of which there is one at least.
 pub(crate) fn extremes<const N: usize>(points: &[DVec3], along: &[DVec3; N]) -> [[usize; 2]; N] {
-    let mut found = [[0; 2]; N];
-    let mut reach = [[f64::INFINITY, f64::NEG_INFINITY]; N];
-    for (i, p) in points.iter().enumerate() {
-        for k in 0..N {
-            let x = along[k].dot(*p);
-            if x < reach[k][0] {
-                (reach[k][0], found[k][0]) = (x, i);
+    // One direction after another: all at once is three times slower, for want of registers.
+    along.map(|n| {
+        let mut found = [0; 2];
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (i, p) in points.iter().enumerate() {
+            let x = n.dot(*p);
+            if x < low {
+                (low, found[0]) = (x, i);
             }
-            if x > reach[k][1] {
-                (reach[k][1], found[k][1]) = (x, i);
+            if x > high {
+                (high, found[1]) = (x, i);
             }
         }
-    }
-    found
+        found
+    })
 }
 
 #[cfg(test)]

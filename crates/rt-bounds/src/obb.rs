@@ -3,9 +3,9 @@
 mod fit;
 
 use crate::cloud::Cloud;
-use crate::unit_ray::U;
+use crate::unit_ray::{U, U32};
 use crate::{Aabb, BoundingVolume, UnitRay};
-use rt_geom::glam::DVec3;
+use rt_geom::glam::{DVec3, Vec3, Vec3A, Vec4, Vec4Swizzles};
 use rt_geom::{Ray, Real, Transform, Vector, f32_above, f32_below};
 
 /// Beyond this size of a coordinate or half width a box is all of space.
@@ -34,27 +34,21 @@ const LEVEL: f64 = f64::from_bits((1023 - 1000) << 52);
 /// use rt_geom::{Transform, glam::{DVec3, Vec3A}};
 /// let rod = Aabb::new(Vec3A::ZERO, Vec3A::new(10.0, 1.0, 1.0));
 /// let turn = Transform::rotation(DVec3::new(1.0, 2.0, 3.0), 0.7).unwrap();
-/// let carried = Obb::carried(&rod, &turn, DVec3::ZERO);
+/// let carried = Obb::carried(&rod, &turn, DVec3::ZERO).unwrap();
 /// assert!((carried.surface_area() - 42.0).abs() < 1e-4);
 /// assert!(BoundingVolume::surface_area(&rod.transformed(&turn, DVec3::ZERO)) > 100.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(64))]
 pub struct Obb {
-    normals: [[f32; 3]; 3],
-    half: [f32; 3],
-    center: [f32; 3],
-    radius: f32,
+    /// For x, y and z: that component of the three normals, then of the centre.
+    columns: [Vec4; 3],
+    /// The three half widths, then the radius.
+    widths: Vec4,
 }
 
 impl Obb {
     /// All of space.
-    pub const INFINITE: Obb = Obb {
-        normals: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        half: [f32::INFINITY; 3],
-        center: [0.0; 3],
-        radius: f32::INFINITY,
-    };
+    pub const INFINITE: Obb = Obb { columns: [Vec4::X, Vec4::Y, Vec4::Z], widths: Vec4::INFINITY };
 
     /// A box as what it is already. `None` where it is not [valid](Aabb::is_valid); all of space where it is infinite.
     pub fn of_aabb(b: &Aabb) -> Option<Obb> {
@@ -65,7 +59,7 @@ impl Obb {
         // The box seen from its centre, rounded outward.
         let seen = Aabb::from_f64(b.min.as_dvec3(), b.max.as_dvec3(), center.as_dvec3());
         let half = seen.max.max(-seen.min);
-        Some(Obb { half: half.to_array(), center: center.to_array(), ..Obb::INFINITE }.with_radius())
+        Some(Obb::from_parts(ALIGNED, half.to_array(), center))
     }
 
     /// The parallelepiped that `map` makes of a box, relative to `origin`. Sheared where the map shears; its normals are the rows
@@ -97,13 +91,8 @@ impl Obb {
         if !reached || !normals.iter().all(|n| n.is_finite()) {
             return Some(Obb::INFINITE);
         }
-        let mut carried = Obb {
-            normals: normals.map(|n| n.as_vec3().to_array()),
-            half: [0.0; 3],
-            center: place.to_array(),
-            radius: 0.0,
-        };
-        if carried.volume().abs() < LEAST_VOLUME {
+        let normals = normals.map(|n| n.as_vec3a());
+        if volume(normals).abs() < LEAST_VOLUME {
             return Obb::of_aabb(&b.transformed(map, origin));
         }
         let edges = [m.x_axis * half.x, m.y_axis * half.y, m.z_axis * half.z];
@@ -111,13 +100,13 @@ impl Obb {
         let x = center - origin;
         let off = x - place.as_dvec3();
         let error = error + (x.abs() + center.abs() + origin.abs()) * (2.0 * U);
-        for i in 0..3 {
-            let n = carried.normal(i);
+        let widths = normals.map(|n| {
+            let n = n.as_dvec3();
             let across = |v: DVec3| n.dot(v).abs() + n.abs().dot(v.abs()) * (4.0 * U);
             let reach = across(off) + edges.iter().map(|e| across(*e)).sum::<f64>() + n.abs().dot(error);
-            carried.half[i] = f32_above(reach * (1.0 + 8.0 * U));
-        }
-        Some(carried.with_radius())
+            f32_above(reach * (1.0 + 8.0 * U))
+        });
+        Some(Obb::from_parts(normals, widths, place))
     }
 
     /// A box around some points, relative to `origin`, whose axes are those of their covariance: of the surface of `triangles`,
@@ -175,12 +164,12 @@ impl Obb {
     }
 
     fn fitted<V: Vector>(axes: [DVec3; 3], cloud: &Cloud, points: &[V], origin: DVec3) -> Option<Obb> {
-        let mut fitted = Obb { normals: axes.map(|n| n.as_vec3().to_array()), ..Obb::INFINITE };
-        let determinant = fitted.volume();
+        let stored = axes.map(|n| n.as_vec3a());
+        let determinant = volume(stored);
         if !(determinant.abs() >= LEAST_VOLUME) {
             return None;
         }
-        let normals = [0, 1, 2].map(|i| fitted.normal(i));
+        let normals = stored.map(|n| n.as_dvec3());
         // The middle of the extents.
         let mut middle = DVec3::ZERO;
         for (i, n) in normals.iter().enumerate() {
@@ -204,52 +193,95 @@ impl Obb {
         }
         // `u |x|` for `x`, `u |q|` for `q` and `3 u |q|` for the product, each at most by the sum of the components.
         let error = most.element_sum() * (6.0 * U) + f64::MIN_POSITIVE;
-        fitted.half = (reach + error).to_array().map(f32_above);
-        fitted.center = center.to_array();
-        Some(fitted.with_radius())
+        Some(Obb::from_parts(stored, (reach + error).to_array().map(f32_above), center))
     }
 
+    #[inline(always)]
     fn normal(&self, i: usize) -> DVec3 {
-        DVec3::from_array(self.normals[i].map(f64::from))
+        let [x, y, z] = self.columns;
+        DVec3::new(x[i] as f64, y[i] as f64, z[i] as f64)
     }
 
+    fn normals(&self) -> [Vec3A; 3] {
+        let [x, y, z] = self.columns;
+        [0, 1, 2].map(|i| Vec3A::new(x[i], y[i], z[i]))
+    }
+
+    #[inline(always)]
     fn center(&self) -> DVec3 {
-        DVec3::from_array(self.center.map(f64::from))
-    }
-
-    /// The volume that the normals span, with its sign: off by at most `16 u`.
-    fn volume(&self) -> f64 {
-        self.normal(0).dot(self.normal(1).cross(self.normal(2)))
+        let [x, y, z] = self.columns;
+        DVec3::new(x.w as f64, y.w as f64, z.w as f64)
     }
 
     /// From the centre half along each edge, rounded. In each component off by at most `2^-32` of the longest edge, because
     /// the normals are of length about 1 and span [`LEAST_VOLUME`] at least.
     fn edges(&self) -> [DVec3; 3] {
-        let volume = self.volume();
+        let volume = volume(self.normals());
         [0, 1, 2].map(|i| {
-            self.normal((i + 1) % 3).cross(self.normal((i + 2) % 3)) * (self.half[i] as f64 / volume)
+            let across = self.normal((i + 1) % 3).cross(self.normal((i + 2) % 3));
+            across * (self.widths[i] as f64 / volume)
         })
     }
 
-    /// Sets the radius from the rest; all of space where that is out of reach.
-    fn with_radius(mut self) -> Obb {
-        if !self.half.iter().all(|h| *h as f64 <= FAR) {
+    /// With the radius that belongs to the rest; all of space where something is out of reach.
+    fn from_parts(normals: [Vec3A; 3], half: [f32; 3], center: Vec3A) -> Obb {
+        let [a, b, c] = normals;
+        let columns = [0, 1, 2].map(|i| Vec4::new(a[i], b[i], c[i], center[i]));
+        let within = |x: f32| x.abs() as f64 <= FAR;
+        if !(half.into_iter().all(within) && center.to_array().into_iter().all(within)) {
             return Obb::INFINITE;
         }
-        let [a, b, c] = self.edges();
+        let mut made = Obb { columns, widths: Vec3::from_array(half).extend(0.0) };
+        let [a, b, c] = made.edges();
         let diagonals = [a + b + c, a + b - c, a - b + c, a - b - c];
         let most = diagonals.iter().fold(0.0f64, |most, d| most.max(d.length()));
         // Beside the error of the edges, squares that underflow.
-        self.radius = f32_above(most * (1.0 + 1.0 / (1u64 << 28) as f64) + f32::MIN_POSITIVE as f64 * U);
-        let reached = (self.radius as f64) <= FAR && self.center().abs().max_element() <= FAR;
-        if reached { self } else { Obb::INFINITE }
+        let radius = f32_above(most * (1.0 + 1.0 / (1u64 << 28) as f64) + f32::MIN_POSITIVE as f64 * U);
+        made.widths.w = radius;
+        if within(radius) { made } else { Obb::INFINITE }
+    }
+
+    /// What [`BoundingVolume::entry`] decides last.
+    #[inline]
+    fn entry_f64(&self, ray: &UnitRay) -> Option<f32> {
+        let m = ray.origin - self.center();
+        let e = ray.slack + (m.abs().element_sum() + self.widths.w as f64) * (32.0 * U);
+        let (mut enter, mut exit) = (ray.near, ray.far);
+        for i in 0..3 {
+            let n = self.normal(i);
+            let (start, pace) = (n.dot(m), n.dot(ray.dir));
+            let half = self.widths[i] as f64 + e;
+            if pace.abs() < LEVEL {
+                if start.abs() > half {
+                    return None;
+                }
+                continue;
+            }
+            let inverse = 1.0 / pace;
+            let (a, b) = ((-half - start) * inverse, (half - start) * inverse);
+            enter = enter.max(a.min(b));
+            exit = exit.min(a.max(b));
+            if enter > exit {
+                return None;
+            }
+        }
+        (enter <= exit).then(|| f32_below(enter))
     }
 
     /// The three slabs whose common part the box is, relative to its origin: normal, a point half way between the planes, and half
     /// of `n . (far - near)`.
     pub fn slabs(&self) -> [(DVec3, DVec3, f64); 3] {
-        [0, 1, 2].map(|i| (self.normal(i), self.center(), self.half[i] as f64))
+        [0, 1, 2].map(|i| (self.normal(i), self.center(), self.widths[i] as f64))
     }
+}
+
+/// Normals along the axes.
+const ALIGNED: [Vec3A; 3] = [Vec3A::X, Vec3A::Y, Vec3A::Z];
+
+/// The volume that normals of length about 1 span, with its sign: off by at most `16 u`.
+fn volume(normals: [Vec3A; 3]) -> f64 {
+    let [a, b, c] = normals.map(|n| n.as_dvec3());
+    a.dot(b.cross(c))
 }
 
 /// `v` with length 1, whatever its size.
@@ -270,42 +302,40 @@ impl BoundingVolume for Obb {
         UnitRay::new(ray, origin)
     }
 
-    /// In `f64`, one slab after another, each only if the ray has met those before.
+    /// In `f32` first, all three slabs in lanes, which dismisses most; then in `f64`, one slab after another, each only if
+    /// the ray has met those before.
     ///
-    /// Why no hit is lost, with `u = 2^-53`, `m` from the centre to the ray's origin `o` and distances `x` along the direction `d`:
-    /// a point of the box lies no farther along than `|x| <= |m| + radius`. There `n . m + x (n . d)` is off by at most
-    /// `u |o| + 4 u |m|` for the first term and `8 u |x|` for the second, the direction's own `4 u` included. So within `e = 2 u |o| +
-    /// 16 u (|m| + radius)` the slab is that of the computed numbers, which are taken as exact from there; a quotient is then
-    /// off by `3 u` of itself.
+    /// Why no hit is lost, with `u = 2^-53` (or `2^-24`), `m` from the centre to the ray's origin `o` and distances `x` along the
+    /// direction `d`: a point of the box lies no farther along than `|x| <= |m| + radius`. There `n . m + x (n . d)` is off by at most
+    /// `u |o| + 4 u |m|` for the first term and `8 u |x|` for the second, the direction's own `4 u` included. A quotient that is
+    /// off by `3 u` of itself is the exact one for an `n . d` off by as much: another `3 u |x|`. So within `e = 2 u |o| +
+    /// 32 u (|m| + radius)` the slab is that of the computed numbers, taken as exact. A slope so small that its reciprocal is cut off or
+    /// that `f64` leaves out moves less than `e` across the slab.
     #[inline]
     fn entry(&self, ray: &UnitRay) -> Option<f32> {
-        let m = ray.origin - self.center();
-        let e = ray.slack + (m.abs().element_sum() + self.radius as f64) * (16.0 * U);
-        let (mut enter, mut exit) = (ray.near, ray.far);
-        for i in 0..3 {
-            let n = self.normal(i);
-            let (start, pace) = (n.dot(m), n.dot(ray.dir));
-            let half = self.half[i] as f64 + e;
-            if pace.abs() < LEVEL {
-                if start.abs() > half {
-                    return None;
-                }
-                continue;
-            }
-            let inverse = 1.0 / pace;
-            let (a, b) = ((-half - start) * inverse, (half - start) * inverse);
-            let (near, far) = (a.min(b), a.max(b));
-            enter = enter.max(near - near.abs() * (8.0 * U));
-            exit = exit.min(far + far.abs() * (8.0 * U));
-            if enter > exit {
-                return None;
-            }
+        const STEEPEST: Vec4 = Vec4::splat((1u128 << 126) as f32);
+        let rough = &ray.rough;
+        let [x, y, z] = self.columns;
+        let m = rough.origin - Vec3A::new(x.w, y.w, z.w);
+        let size = m.abs();
+        let e = rough.slack + (size.x + size.y + size.z + self.widths.w) * (32.0 * U32);
+        // Lane i: slab i. The last lane holds nothing and is not looked at.
+        let start = x * m.x + y * m.y + z * m.z;
+        let inverse = (x * rough.dir.x + y * rough.dir.y + z * rough.dir.z).recip();
+        let inverse = inverse.min(STEEPEST).max(-STEEPEST);
+        let half = self.widths + e;
+        let (a, b) = ((-half - start) * inverse, (half - start) * inverse);
+        let (near, far) = (a.min(b), a.max(b));
+        let enter = near.max(near.yzxw()).max(near.zxyw()).x;
+        let exit = far.min(far.yzxw()).min(far.zxyw()).x;
+        if enter > exit || enter > rough.far || rough.near > exit {
+            return None;
         }
-        (enter <= exit).then(|| f32_below(enter))
+        self.entry_f64(ray)
     }
 
     fn surface_area(&self) -> f64 {
-        if self.radius == f32::INFINITY {
+        if self.widths.w == f32::INFINITY {
             return f64::INFINITY;
         }
         let [a, b, c] = self.edges();
@@ -313,13 +343,13 @@ impl BoundingVolume for Obb {
     }
 
     fn aabb(&self) -> Aabb {
-        if self.radius == f32::INFINITY {
+        if self.widths.w == f32::INFINITY {
             return Aabb::INFINITE;
         }
         let edges = self.edges();
         let reach = edges.iter().fold(DVec3::ZERO, |sum, e| sum + e.abs());
         // Rounding of the edges; a box along the axes has none.
-        let exact = self.normals == Obb::INFINITE.normals;
+        let exact = self.normals() == ALIGNED;
         let longest = edges.iter().fold(0.0f64, |most, e| most.max(e.length()));
         let pad = if exact { 0.0 } else { longest / (1u64 << 29) as f64 + f32::MIN_POSITIVE as f64 * U };
         let reach = reach + pad;
@@ -331,7 +361,7 @@ impl BoundingVolume for Obb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rt_geom::glam::{DMat3, Vec3A};
+    use rt_geom::glam::DMat3;
 
     #[test]
     fn a_box_along_the_axes_stays_itself() {
@@ -359,7 +389,7 @@ mod tests {
         // So thin that f32 normals cannot span it: the box around it.
         let thin = map([1.0, 1.0, 0.0, 1.0, 1.0 + 1e-7, 0.0, 0.0, 0.0, 1.0]);
         let obb = Obb::carried(&cube, &thin, DVec3::ZERO).unwrap();
-        assert_eq!(obb.normals, Obb::INFINITE.normals);
+        assert_eq!(obb.normals(), ALIGNED);
         assert_eq!(Obb::carried(&Aabb::INFINITE, &thin, DVec3::ZERO), Some(Obb::INFINITE));
         assert_eq!(Obb::carried(&Aabb::EMPTY, &thin, DVec3::ZERO), None);
         let huge = Transform::scale(DVec3::splat(1e200)).unwrap();

@@ -4,7 +4,7 @@ mod enclose;
 mod fit;
 
 use crate::cloud::Cloud;
-use crate::unit_ray::U;
+use crate::unit_ray::{U, U32};
 use crate::{Aabb, BoundingVolume, UnitRay};
 use enclose::{enclose, holds_ball};
 use rt_geom::glam::{DVec3, Vec3A};
@@ -121,6 +121,24 @@ impl BoundingSphere {
         finite && self.radius >= 0.0 && holds_ball(self.center, self.radius, other.center, other.radius)
     }
 
+    /// What [`BoundingVolume::entry`] decides last.
+    #[inline]
+    fn entry_f64(&self, ray: &UnitRay) -> Option<f32> {
+        let radius = self.radius as f64;
+        let m = ray.origin - self.center.as_dvec3();
+        let k = m.dot(ray.dir);
+        let across = m - ray.dir * k;
+        let e = (ray.slack + (k.abs() + radius) * (32.0 * U)) * 2.0;
+        let reach = radius + e;
+        let square = reach * reach - across.length_squared() * (1.0 - 64.0 * U);
+        if square < 0.0 {
+            return None;
+        }
+        let half = square.sqrt() + e;
+        let enter = ray.near.max(-k - half);
+        (enter <= ray.far.min(half - k)).then(|| f32_below(enter))
+    }
+
     /// The smallest ball around both, up to the rounding of its centre: the larger one where it holds the other.
     pub fn union(self, other: BoundingSphere) -> BoundingSphere {
         // The same answer whichever comes first.
@@ -160,31 +178,28 @@ impl BoundingVolume for BoundingSphere {
         UnitRay::new(ray, origin)
     }
 
-    /// In `f64`, by the distance of the centre from the line, which does not cancel when the ray starts far away.
+    /// By the distance of the centre from the line, which does not cancel when the ray starts far away: in `f32` first, which
+    /// dismisses what is clearly beside the line, then in `f64`.
     ///
-    /// Why no hit is lost, with `u = 2^-53`, `m` from the centre to the ray's origin `o`, `k` and `f` its parts along the ray and
-    /// across, and a hat for what is computed. `m` is off by `u |o| + u |m|`. The direction, off by `4 u`, and the roundings of
+    /// Why no hit is lost, with `u = 2^-53` (or `2^-24`), `m` from the centre to the ray's origin `o`, `k` and `f` its parts along the
+    /// ray and across, and a hat for what is computed. `m` is off by `u |o| + u |m|`. The direction, off by `4 u`, and the roundings of
     /// `k` and `f` move each of them by at most `18 u |m|` more, and `|m| <= |k| + |f|`. So both errors stay below
     /// `e + 20 u f^` with `e = 2 u |o| + 32 u (|k^| + r)`. If the line meets the ball, then `f^ <= r + e + 20 u f^`, and
     /// `r^2 - f^2 <= r^2 - f^^2 + 2 (e + 20 u f^) f^ <= (r + 2 e)^2 - f^^2 (1 - 64 u)`: the computed half chord is the longer
     /// one, and where the square would be negative there is no hit. What `k` may be off is added to the chord, at both ends.
     ///
-    /// False hits: within some `64 u` of the distance beside the ball, `10^-8` of what `f32` would need.
+    /// False hits: within some `64 u` of the distance beside the ball, `u = 2^-53`.
     #[inline]
     fn entry(&self, ray: &UnitRay) -> Option<f32> {
-        let radius = self.radius as f64;
-        let m = ray.origin - self.center.as_dvec3();
-        let k = m.dot(ray.dir);
-        let across = m - ray.dir * k;
-        let e = (ray.slack + (k.abs() + radius) * (32.0 * U)) * 2.0;
-        let reach = radius + e;
-        let square = reach * reach - across.length_squared() * (1.0 - 64.0 * U);
-        if square < 0.0 {
+        let rough = &ray.rough;
+        let m = rough.origin - self.center;
+        let k = m.dot(rough.dir);
+        let across = m - rough.dir * k;
+        let reach = self.radius + (rough.slack + (k.abs() + self.radius) * (32.0 * U32)) * 2.0;
+        if across.length_squared() * (1.0 - 64.0 * U32) > reach * reach {
             return None;
         }
-        let half = square.sqrt() + e;
-        let enter = ray.near.max(-k - half);
-        (enter <= ray.far.min(half - k)).then(|| f32_below(enter))
+        self.entry_f64(ray)
     }
 
     fn surface_area(&self) -> f64 {

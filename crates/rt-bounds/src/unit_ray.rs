@@ -1,7 +1,7 @@
 //! [`UnitRay`]: a ray made ready for volumes that are met by distances.
 
-use rt_geom::glam::DVec3;
-use rt_geom::{Ray, Real, Vector};
+use rt_geom::glam::{DVec3, Vec3A};
+use rt_geom::{Ray, Real, Vector, f32_above, f32_below};
 
 /// `2^-53`.
 pub(crate) const U: f64 = f64::EPSILON / 2.0;
@@ -10,6 +10,13 @@ const FAR: f64 = f64::from_bits((1023 + 400) << 52);
 /// Added to every slack: `2^-500`, beside which nothing that underflow may take away matters and which is far below the least `f32`.
 const TINY: f64 = f64::from_bits((1023 - 500) << 52);
 
+/// `2^-24`.
+pub(crate) const U32: f32 = f32::EPSILON / 2.0;
+/// Beyond this size the ray in `f32` says nothing.
+const FAR32: f64 = f64::from_bits((1023 + 100) << 52);
+/// Added to the slack in `f32`: `2^-60`, whose square is far from underflow.
+const TINY32: f32 = f32::from_bits((127 - 60) << 23);
+
 /// A ray whose direction has length 1, in `f64`, as [`BoundingSphere`](crate::BoundingSphere) and [`Obb`](crate::Obb) read it.
 ///
 /// Distances are lengths, not the caller's `t`: `t |d|`. The ends are rounded outward, and `slack` says how far the exact line
@@ -17,6 +24,9 @@ const TINY: f64 = f64::from_bits((1023 - 500) << 52);
 ///
 /// Error, in `u = 2^-53`: the direction is off by at most `4 u`, the origin by at most `u |origin|` (the difference to the
 /// structure's origin). An origin beyond `2^400` says nothing, and every volume is then met.
+///
+/// Beside it stands the same ray in `f32`, by which most volumes are dismissed in a few operations; what it cannot dismiss
+/// for certain `f64` decides. So the precision is that of `f64` and the cost, for a miss, that of `f32` lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitRay {
     pub(crate) origin: DVec3,
@@ -25,14 +35,24 @@ pub struct UnitRay {
     pub(crate) far: f64,
     /// Twice the error of the origin, and [`TINY`].
     pub(crate) slack: f64,
+    pub(crate) rough: RoughRay,
+}
+
+/// A [`UnitRay`] in `f32`. Nothing is dismissed by comparisons with NaN or infinity, so overflow does no harm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RoughRay {
+    pub(crate) origin: Vec3A,
+    pub(crate) dir: Vec3A,
+    pub(crate) near: f32,
+    pub(crate) far: f32,
+    pub(crate) slack: f32,
 }
 
 impl UnitRay {
     /// Prepares `ray` for volumes given relative to `origin`. Cost: one square root and three divisions.
     pub fn new<R: Real>(ray: &Ray<R>, origin: DVec3) -> UnitRay {
         if !ray.is_valid() {
-            let (near, far) = (f64::INFINITY, f64::NEG_INFINITY);
-            return UnitRay { origin: DVec3::ZERO, dir: DVec3::ZERO, near, far, slack: 0.0 };
+            return UnitRay::toward(DVec3::ZERO, DVec3::ZERO, f64::INFINITY, f64::NEG_INFINITY);
         }
         let (o, d) = (ray.origin.widen() - origin, ray.dir.widen());
         // A power of two that brings the largest component near 1, so that the length neither over- nor underflows.
@@ -45,11 +65,34 @@ impl UnitRay {
         let outward = |x: f64| if x.is_finite() { x.abs() * (8.0 * U) + TINY } else { 0.0 };
         let (near, far) = (distance(ray.t_min.into()), distance(ray.t_max.next_up().into()));
         let (near, far) = (near - outward(near), far + outward(far));
-        let size = o.length();
-        if size <= FAR {
-            UnitRay { origin: o, dir: scaled / length, near, far, slack: 2.0 * U * size + TINY }
-        } else {
-            UnitRay { origin: DVec3::ZERO, dir: DVec3::ZERO, near, far, slack: f64::INFINITY }
+        UnitRay::toward(o, scaled / length, near, far)
+    }
+
+    fn toward(origin: DVec3, dir: DVec3, near: f64, far: f64) -> UnitRay {
+        let size = origin.length();
+        let (rough_near, rough_far) = (f32_below(near), f32_above(far));
+        let rough = |origin: DVec3, dir: DVec3, slack: f32| RoughRay {
+            origin: origin.as_vec3a(),
+            dir: dir.as_vec3a(),
+            near: rough_near,
+            far: rough_far,
+            slack,
+        };
+        if !(size <= FAR) {
+            let (zero, slack) = (DVec3::ZERO, f64::INFINITY);
+            return UnitRay {
+                origin: zero,
+                dir: zero,
+                near,
+                far,
+                slack,
+                rough: rough(zero, zero, f32::INFINITY),
+            };
         }
+        let rough = match size <= FAR32 {
+            true => rough(origin, dir, size as f32 * (2.5 * U32) + TINY32),
+            false => rough(DVec3::ZERO, DVec3::ZERO, f32::INFINITY),
+        };
+        UnitRay { origin, dir, near, far, slack: 2.0 * U * size + TINY, rough }
     }
 }

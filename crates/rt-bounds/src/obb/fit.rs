@@ -124,6 +124,11 @@ pub(super) fn dito(points: &[DVec3]) -> Axes {
 }
 
 fn dito_of(pairs: &[[DVec3; 2]; 7]) -> Axes {
+    least(pairs.as_flattened(), candidates(pairs))
+}
+
+/// The axes that up to seven triangles between extreme points suggest.
+fn candidates(pairs: &[[DVec3; 2]; 7]) -> Vec<Axes> {
     let few = pairs.as_flattened();
     let apart = |pair: &[DVec3; 2]| pair[0].distance_squared(pair[1]);
     let [a, b] = farthest(pairs, apart);
@@ -132,14 +137,14 @@ fn dito_of(pairs: &[[DVec3; 2]; 7]) -> Axes {
     let normal = along.cross(c - a);
     // Nothing beside the line, up to rounding.
     if normal.length() <= 1e-12 * along.length_squared() {
-        return least(few, axes_about(along));
+        return axes_about(along).into_iter().collect();
     }
     let [below, above] = [-1.0, 1.0].map(|side| farthest(few, |p| side * normal.dot(*p)));
     let base = [a, b, c];
-    let mut candidates = Vec::with_capacity(21);
+    let mut found = Vec::with_capacity(21);
     let mut add = |t: [DVec3; 3]| {
         let normal = (t[1] - t[0]).cross(t[2] - t[0]);
-        candidates.extend((0..3).filter_map(|i| axes_of(t[(i + 1) % 3] - t[i], normal)));
+        found.extend((0..3).filter_map(|i| axes_of(t[(i + 1) % 3] - t[i], normal)));
     };
     add(base);
     for top in [below, above] {
@@ -147,7 +152,7 @@ fn dito_of(pairs: &[[DVec3; 2]; 7]) -> Axes {
             add([base[i], base[(i + 1) % 3], top]);
         }
     }
-    least(few, candidates)
+    found
 }
 
 /// The first of those with the greatest measure.
@@ -164,25 +169,38 @@ fn farthest<T: Copy>(of: &[T], measure: impl Fn(&T) -> f64) -> T {
 
 /// Rounds of letting points join; some three do.
 const ROUNDS: usize = 16;
+/// How many axes to start from, the best of all that are suggested.
+const STARTS: usize = 4;
+/// A turn that gains less than this share of the area is the last.
+const GAIN: f64 = 1e-3;
 
 pub(super) fn tight(points: &[DVec3]) -> Axes {
     let mut few = Vec::with_capacity(64);
     for pair in extremes(points, &DIRECTIONS) {
         few.extend(pair.map(|i| points[i]));
     }
-    let mut best = (half_area(points, &ALIGNED), ALIGNED);
-    for start in [dito_of(&fourteen(&few)), pca(points, &[]), ALIGNED] {
+    let mut starts = candidates(&fourteen(&few));
+    starts.extend([pca(points, &[]), ALIGNED]);
+    let mut starts: Vec<(f64, Axes)> =
+        starts.into_iter().map(|axes| (half_area(&few, &axes), axes)).collect();
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    starts.dedup_by(|a, b| (a.0 - b.0).abs() <= 1e-6 * b.0);
+    let mut best = (f64::INFINITY, ALIGNED);
+    for (_, start) in starts.into_iter().take(STARTS) {
         let mut axes = start;
         for _ in 0..ROUNDS {
             axes = turned(&few, axes);
             let around = half_area(&few, &axes);
+            if around >= best.0 {
+                break;
+            }
             // What sticks out joins.
             few.extend(extremes(points, &axes).as_flattened().iter().map(|i| points[*i]));
             let area = half_area(&few, &axes);
             if area < best.0 {
                 best = (area, axes);
             }
-            if area <= around * (1.0 + 1e-4) {
+            if area <= around * (1.0 + GAIN) {
                 break;
             }
         }
@@ -200,7 +218,7 @@ fn turned(few: &[DVec3], mut axes: Axes) -> Axes {
         let flat: Vec<DVec2> = few.iter().map(|p| DVec2::new(x.dot(*p), y.dot(*p))).collect();
         let (found, side) = least_rectangle(&hull(flat), high - low);
         idle += 1;
-        if found < area * (1.0 - 1e-9) {
+        if found < area * (1.0 - GAIN) {
             let first = (x * side.x + y * side.y).normalize();
             axes[turn % 3] = first;
             axes[(turn + 1) % 3] = z.cross(first);

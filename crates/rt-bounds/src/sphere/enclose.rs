@@ -15,17 +15,23 @@ const RANGE: f64 = f64::from_bits((1023 + 300) << 52);
 /// lies within that error; then expansions decide. Where a coordinate is not zero but below `2^-300`, the error is granted.
 pub(super) fn enclose<V: Vector>(center: DVec3, points: &[V], origin: DVec3) -> BoundingSphere {
     let c = center.as_vec3a();
+    let from = c.as_dvec3();
     let out_of_reach = !(c.abs().max_element() <= FAR);
-    let (mut least, mut most) = (0.0f64, 0.0f64);
+    let (mut farthest, mut reach) = (0.0f64, 0.0f64);
     for p in points {
-        let [low, high] = distance(p.widen(), origin, c);
-        (least, most) = (least.max(low), most.max(high));
+        let x = p.widen() - origin;
+        farthest = farthest.max(x.distance_squared(from));
+        reach = reach.max(x.length_squared());
     }
-    let mut radius = f32_above(most);
+    let distance = farthest.sqrt();
+    // Squares below 2^-1022 are lost: less than 2^-500 of the distance.
+    let error = (reach.sqrt() + 5.0 * distance) * (1.01 * U) + f64::from_bits((1023 - 500) << 52);
+    let mut radius = f32_above(distance + error);
     if out_of_reach || !(radius <= FAR) {
         return BoundingSphere::INFINITE;
     }
     // The greatest radius that is too small for certain: below it nothing needs to be tried.
+    let least = (distance - error).max(0.0);
     let mut small = f32_below(least);
     if small as f64 == least {
         small = small.next_down();
@@ -36,9 +42,11 @@ pub(super) fn enclose<V: Vector>(center: DVec3, points: &[V], origin: DVec3) -> 
             true => 0.0,
             false => f32::from_bits(small.to_bits() + (radius.to_bits() - small.to_bits()) / 2),
         };
+        let clear = (tried as f64 - error).max(0.0);
+        let clear = clear * clear * (1.0 - 8.0 * U);
         let fits = |p: &V| {
             let p = p.widen();
-            distance(p, origin, c)[1] <= tried as f64 || holds(p, origin, c, tried)
+            (p - origin).distance_squared(from) < clear || holds(p, origin, c, tried)
         };
         match points.iter().all(fits) {
             true => radius = tried,
@@ -46,17 +54,6 @@ pub(super) fn enclose<V: Vector>(center: DVec3, points: &[V], origin: DVec3) -> 
         }
     }
     BoundingSphere { center: c, radius }
-}
-
-/// Bounds of the distance from `c` to `p - origin`.
-#[inline(always)]
-fn distance(p: DVec3, origin: DVec3, c: Vec3A) -> [f64; 2] {
-    let x = p - origin;
-    let q = x - c.as_dvec3();
-    let d = q.length();
-    // Squares below 2^-1022 are lost: less than 2^-500 of the distance.
-    let error = (x.length() + 5.0 * d) * (1.01 * U) + f64::from_bits((1023 - 500) << 52);
-    [d - error, d + error]
 }
 
 /// Whether `|p - origin - c| <= r`, exactly; false where a coordinate is out of the range of the expansions.
