@@ -136,8 +136,9 @@ impl Obb {
         Some(Obb::along(fit::dito(&cloud.points), &cloud, points, origin))
     }
 
-    /// A box around some points, relative to `origin`, that no turn about one of its axes makes smaller: started from the boxes of
-    /// [`Obb::dito`] and [`Obb::pca`] and from the axis-aligned one, and turned until nothing is gained. `None` for no points, or one
+    /// A box around some points, relative to `origin`, that no turn about one of its axes makes much smaller: started from the best of
+    /// the axes that [`Obb::dito`] and [`Obb::pca`] look at and those of space, and turned until a thousandth is no longer gained.
+    /// Where few points are extreme, faces along every two of their differences are tried too. `None` for no points, or one
     /// not finite.
     ///
     /// About one axis the best turn is known: of all rectangles around points in a plane the least has a side along an edge of
@@ -293,9 +294,9 @@ fn unit(v: DVec3) -> DVec3 {
 impl BoundingVolume for Obb {
     type Ready = UnitRay;
 
-    /// AROUND
+    /// By [`Obb::dito`]: ten times quicker than [`Obb::tight`], whose boxes are some 5 % smaller.
     fn around<V: Vector>(points: &[V], origin: DVec3) -> Option<Obb> {
-        Obb::tight(points, origin)
+        Obb::dito(points, origin)
     }
 
     fn ready<R: Real>(ray: &Ray<R>, origin: DVec3, _world: &Aabb) -> UnitRay {

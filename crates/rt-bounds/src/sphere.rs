@@ -169,7 +169,7 @@ impl BoundingSphere {
 impl BoundingVolume for BoundingSphere {
     type Ready = UnitRay;
 
-    /// AROUND
+    /// By [`BoundingSphere::smallest`], which costs no more than the others.
     fn around<V: Vector>(points: &[V], origin: DVec3) -> Option<BoundingSphere> {
         BoundingSphere::smallest(points, origin)
     }

@@ -170,23 +170,39 @@ fn farthest<T: Copy>(of: &[T], measure: impl Fn(&T) -> f64) -> T {
 /// Rounds of letting points join; some three do.
 const ROUNDS: usize = 16;
 /// How many axes to start from, the best of all that are suggested.
-const STARTS: usize = 4;
-/// A turn that gains less than this share of the area is the last.
+const STARTS: usize = 8;
+/// Of so few points every two differences are tried as edges, and more starts are taken: with 8 as for larger sets the area is up to
+/// 1.09 of the least, with 32 below 1.05.
+const FEW: usize = 10;
+const STARTS_OF_FEW: usize = 32;
+/// A turn that gains less than this share of the area is the last. With `10^-5` the mean gains 0.0004 for half as much time again.
 const GAIN: f64 = 1e-3;
 
 pub(super) fn tight(points: &[DVec3]) -> Axes {
-    let mut few = Vec::with_capacity(64);
-    for pair in extremes(points, &DIRECTIONS) {
-        few.extend(pair.map(|i| points[i]));
-    }
+    let mut numbers = extremes(points, &DIRECTIONS).as_flattened().to_vec();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let mut few: Vec<DVec3> = numbers.into_iter().map(|i| points[i]).collect();
     let mut starts = candidates(&fourteen(&few));
+    let mut starts_taken = STARTS;
+    if few.len() <= FEW {
+        starts_taken = STARTS_OF_FEW;
+        // Two faces perpendicular to each other, each along an edge.
+        let edges: Vec<DVec3> = (0..few.len())
+            .flat_map(|i| few[..i].iter().map(move |p| (i, *p)))
+            .map(|(i, p)| few[i] - p)
+            .collect();
+        for a in &edges {
+            starts.extend(edges.iter().filter_map(|b| axes_of(*a, a.cross(*b))));
+        }
+    }
     starts.extend([pca(points, &[]), ALIGNED]);
     let mut starts: Vec<(f64, Axes)> =
         starts.into_iter().map(|axes| (half_area(&few, &axes), axes)).collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     starts.dedup_by(|a, b| (a.0 - b.0).abs() <= 1e-6 * b.0);
     let mut best = (f64::INFINITY, ALIGNED);
-    for (_, start) in starts.into_iter().take(STARTS) {
+    for (_, start) in starts.into_iter().take(starts_taken) {
         let mut axes = start;
         for _ in 0..ROUNDS {
             axes = turned(&few, axes);

@@ -5,7 +5,7 @@ use crate::points::{narrow, turn};
 use rt_bounds::{Aabb, BoundingSphere, BoundingVolume, Obb};
 use rt_geom::glam::{DAffine3, DMat3, DVec3, Vec3A};
 use rt_geom::{Ray, Real, Transform, Vector};
-use rt_measure::exact::{ball_meets, slabs};
+use rt_measure::exact::{Slab, ball_meets, slabs};
 use rt_measure::rays::Seeded;
 
 /// What happened to some pairs of ray and volume.
@@ -63,6 +63,19 @@ fn towards<R: Real>(seeded: &mut Seeded, point: DVec3, normal: DVec3, size: f64)
     Ray { origin: R::Vec3::nearest(origin), dir: R::Vec3::nearest(dir), t_min, t_max }
 }
 
+/// `2^-44` of the distances between a ray and a volume of some size, and the ray's interval longer by that and by the rounding of a
+/// `t` at its far end.
+fn trifle<R: Real>(ray: &Ray<R>, origin: DVec3, center: DVec3, size: f64) -> (f64, [f64; 2]) {
+    let (o, d) = (ray.origin.widen(), ray.dir.widen());
+    let far = o.length() + origin.length() + center.length() + size;
+    let trifle = far * 2f64.powi(-44);
+    let longest = d.abs().max_element();
+    let [t_min, t_max]: [f64; 2] = [ray.t_min.into(), ray.t_max.next_up().into()];
+    let more = |t: f64| trifle / longest + t.abs() * 2f64.powi(-44);
+    let wider = |t: f64, sign: f64| if t.is_finite() { t + sign * more(t) } else { t };
+    (trifle, [wider(t_min, -1.0), wider(t_max, 1.0)])
+}
+
 const SIZES: [f64; 6] = [1.0, 1e30, 1e-30, 1e-41, 1e3, 1e-3];
 
 fn a_ball(seeded: &mut Seeded) -> (BoundingSphere, f64) {
@@ -100,6 +113,15 @@ fn ball_pair<R: Real>(seeded: &mut Seeded, tally: &mut Tally) {
     let ready = BoundingSphere::ready(&ray, origin, &ball.aabb());
     let found = ball.entry(&ready);
     assert!(!truth || found.is_some(), "{ball:?} {ray:?} {origin}");
+    if found.is_some() && !truth {
+        // What is invented is met by a ball and a segment that are a trifle larger.
+        let (trifle, t) = trifle(&ray, origin, ball.center.as_dvec3(), ball.radius as f64);
+        let radius = ball.radius as f64 + trifle;
+        assert!(
+            ball_meets(o.to_array(), d.to_array(), t, origin.to_array(), c, radius),
+            "{ball:?} {ray:?} {origin}"
+        );
+    }
     tally.count(truth, found.is_some());
 }
 
@@ -148,6 +170,14 @@ fn box_pair<R: Real>(seeded: &mut Seeded, tally: &mut Tally) {
         .is_some_and(|span| span.meets(ray.t_min.into(), ray.t_max.into()));
     let found = obb.entry(&Obb::ready(&ray, origin, &obb.aabb()));
     assert!(!truth || found.is_some(), "{obb:?} {ray:?} {origin}");
+    if found.is_some() && !truth {
+        let widest = obb.aabb().size().as_dvec3().length();
+        let (trifle, t) = trifle(&ray, origin, a.1, widest);
+        let larger = slabs_of(&obb).map(|slab| Slab { half: slab.half + trifle, ..slab });
+        let met = slabs(&larger, o.to_array(), d.to_array(), origin.to_array());
+        // Each slab may be met a trifle outside the others.
+        assert!(met.is_some_and(|span| span.meets(t[0], t[1])), "{obb:?} {ray:?} {origin}");
+    }
     tally.count(truth, found.is_some());
 }
 
