@@ -63,12 +63,12 @@ fn towards<R: Real>(seeded: &mut Seeded, point: DVec3, normal: DVec3, size: f64)
     Ray { origin: R::Vec3::nearest(origin), dir: R::Vec3::nearest(dir), t_min, t_max }
 }
 
-/// `2^-44` of the distances between a ray and a volume of some size, and the ray's interval longer by that and by the rounding of a
+/// `2^-44` of the distances between a ray and a volume of some size and what stands for underflow, and the ray's interval longer by that and by the rounding of a
 /// `t` at its far end.
 fn trifle<R: Real>(ray: &Ray<R>, origin: DVec3, center: DVec3, size: f64) -> (f64, [f64; 2]) {
     let (o, d) = (ray.origin.widen(), ray.dir.widen());
     let far = o.length() + origin.length() + center.length() + size;
-    let trifle = far * 2f64.powi(-44);
+    let trifle = far * 2f64.powi(-44) + 2f64.powi(-498);
     let longest = d.abs().max_element();
     let [t_min, t_max]: [f64; 2] = [ray.t_min.into(), ray.t_max.next_up().into()];
     let more = |t: f64| trifle / longest + t.abs() * 2f64.powi(-44);
