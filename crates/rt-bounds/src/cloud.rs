@@ -24,8 +24,8 @@ pub(crate) const DIRECTIONS: [DVec3; 13] = [
 
 /// Points in `f64` about the middle of their box, scaled by a power of two so that the farthest coordinate is about 1.
 ///
-/// So fitting meets neither overflow nor underflow, and loses no digits to an offset. What is fitted here is a guess, rounded;
-/// that a volume holds its points is decided on the points themselves.
+/// So fitting meets neither overflow nor underflow, and loses no digits to an offset. What is fitted here is a guess,
+/// rounded; that a volume holds its points is decided on the points themselves.
 pub(crate) struct Cloud {
     /// The points; at least one.
     pub(crate) points: Vec<DVec3>,
@@ -64,7 +64,8 @@ impl Cloud {
     }
 }
 
-/// The first points farthest back and farthest ahead along each direction, as numbers of points, of which there is one at least.
+/// The first points farthest back and farthest ahead along each direction, as numbers of points, of which there is one
+/// at least.
 pub(crate) fn extremes<const N: usize>(points: &[DVec3], along: &[DVec3; N]) -> [[usize; 2]; N] {
     // One direction after another: all at once is three times slower, for want of registers.
     along.map(|n| {

@@ -1,4 +1,4 @@
-//! Volumes that enclose things, and the slab test.
+//! Volumes that enclose things, and the slab test: boxes, balls and oriented boxes.
 //!
 //! Boxes are `f32` and always rounded outward; a ray of either precision meets them through a [`SlabRay`], which encloses the
 //! ray it is made from. So a traversal may say *hit* too often, by a few units in the last place, and never *miss* wrongly:

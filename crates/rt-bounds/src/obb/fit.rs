@@ -171,11 +171,12 @@ fn farthest<T: Copy>(of: &[T], measure: impl Fn(&T) -> f64) -> T {
 const ROUNDS: usize = 16;
 /// How many axes to start from, the best of all that are suggested.
 const STARTS: usize = 8;
-/// Of so few points every two differences are tried as edges, and more starts are taken: with 8 as for larger sets the area is up to
-/// 1.09 of the least, with 32 below 1.05.
+/// Of so few points every two differences are tried as edges, and more starts are taken: with 8 as for larger sets the
+/// area is up to 1.09 of the least, with 32 below 1.05.
 const FEW: usize = 10;
 const STARTS_OF_FEW: usize = 32;
-/// A turn that gains less than this share of the area is the last. With `10^-5` the mean gains 0.0004 for half as much time again.
+/// A turn that gains less than this share of the area is the last. With `10^-5` the mean gains 0.0004 for half as much
+/// time again.
 const GAIN: f64 = 1e-3;
 
 pub(super) fn tight(points: &[DVec3]) -> Axes {
@@ -251,8 +252,8 @@ fn turned(few: &[DVec3], mut axes: Axes) -> Axes {
 
 /// The convex hull of points in a plane, counter-clockwise.
 ///
-/// Source: Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979). Its signs are rounded, which may cost
-/// a box that is not quite the least, never one that is too small.
+/// Source: Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979). Its signs are rounded,
+/// which may cost a box that is not quite the least, never one that is too small.
 fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let mut ring: Vec<DVec2> = Vec::with_capacity(points.len() + 1);
@@ -278,7 +279,8 @@ fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     ring
 }
 
-/// Of the boxes of some height on rectangles with a side along an edge of `ring`: half the area of the least, and that side.
+/// Of the boxes of some height on rectangles with a side along an edge of `ring`: half the area of the least, and that
+/// side.
 fn least_rectangle(ring: &[DVec2], height: f64) -> (f64, DVec2) {
     let mut best = (f64::INFINITY, DVec2::X);
     for i in 0..ring.len() {

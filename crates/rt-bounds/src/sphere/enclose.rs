@@ -9,14 +9,15 @@ use rt_geom::{Vector, f32_above, f32_below};
 /// Factors whose products the expansions hold exactly lie between `1 / RANGE` and `RANGE`.
 const RANGE: f64 = f64::from_bits((1023 + 300) << 52);
 
-/// The sphere about `center`, rounded to `f32`, that holds all `points` less `origin`, with the least `f32` radius that does.
+/// The sphere about `center`, rounded to `f32`, that holds all `points` less `origin`, with the least `f32` radius that
+/// does.
 ///
-/// A distance computed in `f64` is off by at most `u |p - origin| + 4 u |p - origin - c|` and settles the radius unless an `f32`
-/// lies within that error; then expansions decide. Where a coordinate is not zero but below `2^-300`, the error is granted.
+/// A distance computed in `f64` is off by at most `u |p - origin| + 4 u |p - origin - c|` and settles the radius unless
+/// an `f32` lies within that error; then expansions decide. Where a coordinate is not zero but below `2^-300`, the
+/// error is granted.
 pub(super) fn enclose<V: Vector>(center: DVec3, points: &[V], origin: DVec3) -> BoundingSphere {
     let c = center.as_vec3a();
     let from = c.as_dvec3();
-    let out_of_reach = !(c.abs().max_element() <= FAR);
     let (mut farthest, mut reach) = (0.0f64, 0.0f64);
     for p in points {
         let x = p.widen() - origin;
@@ -27,7 +28,8 @@ pub(super) fn enclose<V: Vector>(center: DVec3, points: &[V], origin: DVec3) -> 
     // Squares below 2^-1022 are lost: less than 2^-500 of the distance.
     let error = (reach.sqrt() + 5.0 * distance) * (1.01 * U) + f64::from_bits((1023 - 500) << 52);
     let mut radius = f32_above(distance + error);
-    if out_of_reach || !(radius <= FAR) {
+    let reached = radius <= FAR && c.abs().max_element() <= FAR;
+    if !reached {
         return BoundingSphere::INFINITE;
     }
     // The greatest radius that is too small for certain: below it nothing needs to be tried.

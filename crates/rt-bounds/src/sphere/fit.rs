@@ -64,12 +64,13 @@ const ROUNDS: usize = 300;
 
 /// The smallest ball: a support of at most four points, exchanged for a better one as long as a point lies outside.
 ///
-/// In each round the farthest point joins, and the smallest ball of these five at most is found among all balls that have the new
-/// point and some of the others on their boundary: the one whose centre has the least farthest point. No sign is
-/// decided, so there is no tolerance to choose: a support that is flat or coincident yields a centre that is not finite or
-/// far off, which loses against one of its parts.
+/// In each round the farthest point joins, and the smallest ball of these five at most is found among all balls that
+/// have the new point and some of the others on their boundary: the one whose centre has the least farthest point. No
+/// sign is decided, so there is no tolerance to choose: a support that is flat or coincident yields a centre that is
+/// not finite or far off, which loses against one of its parts.
 ///
-/// It ends when the ball of the support holds all points: by then no ball of the points is smaller than that of the support.
+/// It ends when the ball of the support holds all points: by then no ball of the points is smaller than that of the
+/// support.
 pub(super) fn smallest(points: &[DVec3]) -> Ball {
     let mut support = [points[0]; 5];
     let mut len = 1;
@@ -104,8 +105,8 @@ fn farthest(points: &[DVec3], from: DVec3) -> (DVec3, f64) {
     found
 }
 
-/// The smallest ball of `support[..=last]` that touches the last of them, and how many of the points it needs; they are moved to
-/// the front.
+/// The smallest ball of `support[..=last]` that touches the last of them, and how many of the points it needs; they are
+/// moved to the front.
 fn exchange(support: &mut [DVec3; 5], last: usize) -> (Ball, usize) {
     let all = *support;
     let new = all[last];

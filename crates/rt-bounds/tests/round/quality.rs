@@ -59,8 +59,9 @@ fn turned_cubes_and_rods_are_found() {
     }
 }
 
-/// The least half area of a box around a few points that any search here finds: with a face on any three points and a side along any
-/// edge of what they look like from there, and from many random rotations, each turned by ever smaller random turns.
+/// The least half area of a box around a few points that any search here finds: with a face on any three points and a
+/// side along any edge of what they look like from there, and from many random rotations, each turned by ever smaller
+/// random turns.
 fn exhaustive(points: &[DVec3], seeded: &mut Seeded) -> f64 {
     let area = |m: &DMat3| {
         let mut size = [0.0; 3];

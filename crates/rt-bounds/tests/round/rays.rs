@@ -26,7 +26,8 @@ impl Tally {
     }
 }
 
-/// A ray towards a point of a surface: through it, along it, or along an axis past it; its ends often exactly where it is.
+/// A ray towards a point of a surface: through it, along it, or along an axis past it; its ends often exactly where it
+/// is.
 ///
 /// `normal` points outward, and need only be roughly normal.
 fn towards<R: Real>(seeded: &mut Seeded, point: DVec3, normal: DVec3, size: f64) -> Ray<R> {
@@ -63,8 +64,8 @@ fn towards<R: Real>(seeded: &mut Seeded, point: DVec3, normal: DVec3, size: f64)
     Ray { origin: R::Vec3::nearest(origin), dir: R::Vec3::nearest(dir), t_min, t_max }
 }
 
-/// `2^-44` of the distances between a ray and a volume of some size and what stands for underflow, and the ray's interval longer by that and by the rounding of a
-/// `t` at its far end.
+/// `2^-44` of the distances between a ray and a volume of some size and what stands for underflow, and the ray's
+/// interval longer by that and by the rounding of a `t` at its far end.
 fn trifle<R: Real>(ray: &Ray<R>, origin: DVec3, center: DVec3, size: f64) -> (f64, [f64; 2]) {
     let (o, d) = (ray.origin.widen(), ray.dir.widen());
     let far = o.length() + origin.length() + center.length() + size;
@@ -171,7 +172,8 @@ fn box_pair<R: Real>(seeded: &mut Seeded, tally: &mut Tally) {
     let found = obb.entry(&Obb::ready(&ray, origin, &obb.aabb()));
     assert!(!truth || found.is_some(), "{obb:?} {ray:?} {origin}");
     if found.is_some() && !truth {
-        let widest = obb.aabb().size().as_dvec3().length();
+        // And the least radius that is not zero.
+        let widest = obb.aabb().size().as_dvec3().length() + 2f64.powi(-149);
         let (trifle, t) = trifle(&ray, origin, a.1, widest);
         let larger = slabs_of(&obb).map(|slab| Slab { half: slab.half + trifle, ..slab });
         let met = slabs(&larger, o.to_array(), d.to_array(), origin.to_array());

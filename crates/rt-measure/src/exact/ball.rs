@@ -33,7 +33,7 @@ pub fn ball_holds(center: Vec3, radius: f64, point: Vec3, origin: Vec3) -> bool 
 /// ```
 pub fn ball_meets(at: Vec3, dir: Vec3, t: [f64; 2], origin: Vec3, center: Vec3, radius: f64) -> bool {
     let finite = center.iter().chain(&origin).all(|x| x.is_finite()) && radius.is_finite();
-    if !is_line(&at, &dir) || !finite || radius < 0.0 || !(t[0] <= t[1]) {
+    if !is_line(&at, &dir) || !finite || radius < 0.0 || t[0].partial_cmp(&t[1]).is_none_or(|o| o.is_gt()) {
         return false;
     }
     let ([p, o, c, [r, _, _]], unit) = integers([at, origin, center, [radius, 0.0, 0.0]]);
@@ -56,8 +56,8 @@ pub fn ball_meets(at: Vec3, dir: Vec3, t: [f64; 2], origin: Vec3, center: Vec3, 
         })
 }
 
-/// The square of the radius of the smallest ball around points, exactly, found among all balls through up to four of them; `None`
-/// for no points or one not finite.
+/// The square of the radius of the smallest ball around points, exactly, found among all balls through up to four of
+/// them; `None` for no points or one not finite.
 ///
 /// Cost: the fifth power of their number, so for a dozen at most.
 ///
@@ -111,8 +111,8 @@ pub fn smallest_ball(points: &[Vec3]) -> Option<Rational> {
     best
 }
 
-/// The centre of the least sphere through zero and some points, and its common denominator; `None` where they depend on each
-/// other.
+/// The centre of the least sphere through zero and some points, and its common denominator; `None` where they depend on
+/// each other.
 fn circumcenter(sides: &[Vector]) -> Option<(Vector, BigInt)> {
     let times = |v: &Vector, by: &BigInt| [&v[0] * by, &v[1] * by, &v[2] * by];
     let plus = |a: &Vector, b: &Vector| [&a[0] + &b[0], &a[1] + &b[1], &a[2] + &b[2]];

@@ -14,8 +14,8 @@ pub struct Slab {
     pub half: f64,
 }
 
-/// Whether every one of the closed slabs holds `point - origin`, exactly. False where a number is not finite, but for an infinite
-/// `half`.
+/// Whether every one of the closed slabs holds `point - origin`, exactly. False where a number is not finite, but for
+/// an infinite `half`.
 ///
 /// ```
 /// use rt_measure::exact::{Slab, slabs_hold};
@@ -41,14 +41,15 @@ pub fn slabs_hold(slabs: &[Slab], point: Vec3, origin: Vec3) -> bool {
     })
 }
 
-/// The part of the line `at + t dir - origin` in every one of the closed slabs, if there is any. `None` where a number is not
-/// finite, but for an infinite `half`.
+/// The part of the line `at + t dir - origin` in every one of the closed slabs, if there is any. `None` where a number
+/// is not finite, but for an infinite `half`.
 pub fn slabs(slabs: &[Slab], at: Vec3, dir: Vec3, origin: Vec3) -> Option<Span> {
     let mut span = Span { enter: None, exit: None };
     for slab in slabs {
         let Slab { normal, middle, half } = *slab;
         let numbers = [normal, middle, origin];
-        if !is_line(&at, &dir) || !numbers.iter().flatten().all(|x| x.is_finite()) || !(half >= 0.0) {
+        let wide = half >= 0.0;
+        if !is_line(&at, &dir) || !numbers.iter().flatten().all(|x| x.is_finite()) || !wide {
             return None;
         }
         if half.is_infinite() {
