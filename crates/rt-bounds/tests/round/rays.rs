@@ -138,7 +138,7 @@ fn a_box(seeded: &mut Seeded) -> (Obb, f64) {
         kind => {
             let mut matrix3 = DMat3::from_quat(turn(seeded));
             if kind == 2 {
-                matrix3 = matrix3 * DMat3::from_cols_array(&[0.0; 9].map(|_| seeded.between(-1.0, 1.0)));
+                matrix3 *= DMat3::from_cols_array(&[0.0; 9].map(|_| seeded.between(-1.0, 1.0)));
             }
             let translation = seeded.direction() * size;
             Transform::new(DAffine3 { matrix3, translation })
