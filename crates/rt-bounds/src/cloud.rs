@@ -67,7 +67,7 @@ impl Cloud {
 /// The first points farthest back and farthest ahead along each direction, as numbers of points, of which there is one
 /// at least.
 pub(crate) fn extremes<const N: usize>(points: &[DVec3], along: &[DVec3; N]) -> [[usize; 2]; N] {
-    // One direction after another: all at once is three times slower, for want of registers.
+    // One direction after another: all at once was slower, for want of registers.
     along.map(|n| {
         let mut found = [0; 2];
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);

@@ -155,7 +155,7 @@ impl Obb {
     /// edge of their convex hull. Turns are found for a few extreme points, and a point that the turned box leaves out
     /// joins them.
     ///
-    /// Cost: some twenty passes over the points, and some hundred microseconds.
+    /// Cost: twenty to sixty passes over the points, and some hundred microseconds.
     ///
     /// Source: the turns, Freeman and Shapira, "Determining the minimum-area encasing rectangle for an arbitrary closed
     /// curve" (1975), taken about each axis in turn as Barequet and Har-Peled, "Efficiently approximating the
