@@ -59,7 +59,8 @@ pub(super) fn epos(points: &[DVec3], of: Extremes) -> Ball {
 
 /// How far beyond the ball of its support a point may lie, as a share of the squared radius. `f32` sees none of it.
 const CLOSE: f64 = 1e-13;
-/// Rounds at most. The radius grows in each, and four to six do, of 24 points or `10^5`; this only ends what rounding might let turn in a circle.
+/// Rounds at most. The radius grows in each, and four to six do, of 24 points or `10^5`; this only ends what rounding might
+/// let turn in a circle.
 const ROUNDS: usize = 300;
 
 /// The smallest ball: a support of at most four points, exchanged for a better one as long as a point lies outside.
