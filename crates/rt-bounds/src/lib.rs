@@ -1,4 +1,4 @@
-//! Volumes that enclose things, and the tests of rays, cones and beams against boxes.
+//! Volumes that enclose things, and the tests of rays, cones and beams against them.
 //!
 //! Boxes are `f32` and always rounded outward; a ray of either precision meets them through a [`SlabRay`], which encloses the
 //! ray it is made from. So a traversal may say *hit* too often, by a few units in the last place, and never *miss* wrongly:
@@ -24,10 +24,17 @@
 mod aabb;
 mod moving;
 mod overlap;
+mod cloud;
+mod obb;
 mod slab;
+mod sphere;
+mod unit_ray;
 mod volume;
 
 pub use aabb::Aabb;
 pub use overlap::{BeamTest, ConeTest};
+pub use obb::Obb;
 pub use slab::{BoxPair, SlabRay};
+pub use sphere::{BoundingSphere, Extremes};
+pub use unit_ray::UnitRay;
 pub use volume::BoundingVolume;
