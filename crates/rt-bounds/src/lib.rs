@@ -22,9 +22,17 @@
 //! yet, because the conservative test costs no operation more.
 
 mod aabb;
+mod lanes;
+mod octet;
 mod slab;
 mod volume;
 
 pub use aabb::Aabb;
+pub use lanes::{Eight, Lanes, Portable};
+pub use octet::{BoxOctet, WideRay};
 pub use slab::{BoxPair, SlabRay};
 pub use volume::BoundingVolume;
+
+#[cfg(feature = "simd")]
+#[doc(hidden)]
+pub use fearless_simd;
