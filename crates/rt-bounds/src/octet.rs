@@ -144,3 +144,38 @@ impl<L: Lanes> WideRay<L> {
         (enter.at_most(exit), enter.store())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Portable;
+    use rt_geom::Ray;
+    use rt_geom::glam::{DVec3, Vec3A};
+
+    #[test]
+    fn boxes_go_in_and_out() {
+        let boxes = [1.0, 2.0, 3.0].map(|x| Aabb::new(Vec3A::splat(-x), Vec3A::new(x, 2.0 * x, 3.0 * x)));
+        let octet = BoxOctet::new(&boxes);
+        assert_eq!(octet.boxes()[..3], boxes);
+        assert_eq!(octet.boxes()[3..], [Aabb::EMPTY; 5]);
+        assert_eq!(BoxOctet::default().boxes(), [Aabb::EMPTY; 8]);
+        assert_eq!(BoxOctet::new(&[Aabb::INFINITE; 9]).boxes(), [Aabb::INFINITE; 8]);
+        assert_eq!((size_of::<BoxOctet>(), align_of::<BoxOctet>()), (192, 64));
+    }
+
+    #[test]
+    fn a_ray_shortened_meets_less_and_empty_places_are_not_met() {
+        let boxes = [1.0, 2.0, 3.0, 4.0].map(|z| Aabb::new(Vec3A::splat(z), Vec3A::splat(z)));
+        let octet = BoxOctet::new(&boxes);
+        let ray = Ray::new(Vec3A::ZERO, Vec3A::ONE);
+        let mut slab = SlabRay::new(&ray, DVec3::ZERO, &boxes[3]);
+        let mut wide = slab.wide(Portable);
+        assert_eq!(
+            (slab.enter_eight(&octet), wide.enter_eight(&octet).0),
+            (wide.enter_eight(&octet), 0b1111)
+        );
+        slab.shorten(2.5f32);
+        wide.shorten(&slab);
+        assert_eq!((slab.enter_eight(&octet).0, wide.enter_eight(&octet).0), (0b11, 0b11));
+    }
+}
