@@ -22,12 +22,14 @@
 //! yet, because the conservative test costs no operation more.
 
 mod aabb;
+mod double;
 mod lanes;
 mod octet;
 mod slab;
 mod volume;
 
 pub use aabb::Aabb;
+pub use double::DAabb;
 pub use lanes::{Eight, Lanes, Portable};
 pub use octet::{BoxOctet, WideRay};
 pub use slab::{BoxPair, SlabRay};

@@ -4,9 +4,9 @@ use crate::{Meeting, Surface, Surfaced, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Bounded, Geometry, Hit};
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::{DVec2, DVec3, Vec3A};
-use rt_geom::{Ray, Real, gamma};
+use rt_geom::{Ray, Real, Transform, gamma};
 
 /// Triangles over shared vertices, in world space, of `f32` or `f64` coordinates.
 ///
@@ -183,6 +183,10 @@ impl<V: Real> Bounded for TriangleMesh<V> {
             return Aabb::new(Vec3A::NAN, Vec3A::NAN);
         }
         Aabb::from_f64(a.min(b).min(c), a.max(b).max(c), origin)
+    }
+
+    fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
+        DAabb::around_carried(self.get(prim).map_or([DVec3::NAN; 3], |triangle| triangle.corners), map)
     }
 }
 
