@@ -85,8 +85,9 @@ impl DAabb {
     /// place; `None` where the ray does not meet the closed box. Whether it does is decided exactly: in `f64` almost always, by
     /// exact products where that is in doubt.
     ///
-    /// Coordinates and components of the direction, as far as they are neither zero nor infinite, are to lie between `2^-450` and
-    /// `2^450` in size. Beyond, a ray meets every box along its whole interval.
+    /// Exactly, where coordinates, components of the direction and ends of the interval, as far as they are neither zero nor
+    /// infinite, lie between `2^-450` and `2^450` in size. Of what is larger a ray meets every box, along its whole interval; what
+    /// is smaller may be taken for zero beside what is not.
     pub fn span(&self, ray: &Ray<f64>) -> Option<[f64; 2]> {
         let (o, d) = (ray.origin, ray.dir);
         let (mut enter, mut exit) = (ray.t_min, ray.t_max);

@@ -2,7 +2,7 @@
 
 use fearless_simd::Level;
 use proptest::prelude::*;
-use rt_bounds::{Aabb, BoxOctet, BoxPair, Portable, SlabRay};
+use rt_bounds::{Aabb, BoxOctet, BoxPair, DAabb, Portable, SlabRay};
 use rt_geom::glam::{DVec3, Vec3A};
 use rt_geom::{Ray, Real, Vector};
 use rt_measure::conform::paste;
@@ -348,6 +348,48 @@ fn eight_like_one<R: Real>(seed: u64, cases: usize) -> usize {
 fn eight_boxes_answer_as_one_at_every_level() {
     let hits = [eight_like_one::<f32>(5, 60_000), eight_like_one::<f64>(6, 60_000)];
     assert!(hits.iter().all(|&hits| hits > 40_000), "only {hits:?} boxes met");
+}
+
+#[test]
+fn boxes_in_f64_are_met_exactly() {
+    let mut seeded = Seeded::new(7);
+    let (mut hits, mut asked) = (0, 0);
+    for _ in 0..60_000 {
+        let b = a_box(&mut seeded);
+        let ray: Ray<f64> = a_ray(&mut seeded, &b);
+        // Neighbours in f64 of what f32 can say.
+        let step = |x: f64, up: usize| [x, x.next_up(), x.next_down()][up % 3];
+        let [x, y, z] = ray.origin.to_array();
+        let origin = DVec3::new(step(x, seeded.below(9)), step(y, seeded.below(9)), step(z, seeded.below(9)));
+        let ray = Ray { origin, ..ray };
+        let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+        let moderate =
+            |v: DVec3| v.to_array().iter().all(|x| *x == 0.0 || (1e-130..1e130).contains(&x.abs()));
+        if !ray.is_valid() || !b.is_valid() || !moderate(ray.origin) || !moderate(ray.dir) {
+            continue;
+        }
+        let Some(span) = span_of(&ray, min, max) else {
+            assert_eq!(DAabb { min, max }.span(&ray.between(f64::NEG_INFINITY, f64::INFINITY)), None);
+            continue;
+        };
+        for (t_min, t_max) in intervals(&mut seeded, &span) {
+            if [t_min, t_max].iter().any(|t: &f64| *t != 0.0 && t.abs() < 1e-130) {
+                continue;
+            }
+            let met = span.meets(t_min, t_max);
+            let said = DAabb { min, max }.span(&ray.between(t_min, t_max));
+            asked += 1;
+            hits += usize::from(met);
+            assert_eq!(said.is_some(), met, "{} {b:?} {t_min:e} {t_max:e}", paste(&ray));
+            let Some([near, far]) = said else { continue };
+            let inside = |end: &exact::Rational| {
+                let end: f64 = end.nearest();
+                near.next_down() <= end.max(t_min) && end.min(t_max) <= far.next_up()
+            };
+            assert!(span.enter.as_ref().is_none_or(inside) && span.exit.as_ref().is_none_or(inside));
+        }
+    }
+    assert!(hits > 100_000 && asked > 5 * hits / 4, "{hits} of {asked}");
 }
 
 proptest! {
