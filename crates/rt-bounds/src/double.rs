@@ -101,7 +101,7 @@ impl DAabb {
             }
             let [near, far] = self.planes(a, d[a]);
             let size = d[a].abs();
-            moderate &= size <= LARGE && size >= 1.0 / LARGE;
+            moderate &= (1.0 / LARGE..=LARGE).contains(&size);
             moderate &=
                 (near.abs() <= LARGE || near.is_infinite()) && (far.abs() <= LARGE || far.is_infinite());
             enter = enter.max((near - o[a]) / d[a]);
