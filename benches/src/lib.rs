@@ -61,6 +61,9 @@ mod queries;
 #[cfg(feature = "rivals")]
 mod rivals;
 mod slab;
+// Part of the question `volumes`.
+#[allow(dead_code)]
+mod space;
 mod subject;
 mod volumes;
 

@@ -250,39 +250,10 @@ impl Aabb {
         Axis::longest(self.size())
     }
 
-    /// A box around this one carried by `map`, given relative to `origin`: the box of the carried corners, rounded outward
-    /// and grown by the error of the map and of rays carried back through it from nearby.
-    ///
-    /// Source: Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems (1990), in centre and half-size form.
+    /// A box around this one carried by `map`, given relative to `origin`: [`Aabb::carried`], rounded outward.
     pub fn transformed(self, map: &Transform, origin: DVec3) -> Aabb {
-        if !self.is_valid() {
-            return self;
-        }
-        let (min, max) = (self.min.as_dvec3(), self.max.as_dvec3());
-        if !(min.is_finite() && max.is_finite()) {
-            return Aabb::INFINITE;
-        }
-        let m = map.linear();
-        let half = (max - min) * 0.5;
-        let reach = m.abs() * half;
-        let center = map.point((min + max) * 0.5);
-        // Rounding of the box, and of a ray moved into the box's own space, which is some roundings of the size there
-        // and comes back multiplied by the map, both in f64; exact maps keep exact boxes.
-        let size = center.abs() + reach;
-        let back = m.abs() * (map.inverse().linear().abs() * size);
-        let slack = if exact(m) { 0.0 } else { 32.0 * f64::EPSILON };
-        let pad = (size + back) * slack;
-        Aabb::from_f64(center - reach - pad, center + reach + pad, origin)
+        if self.is_valid() { self.carried(map).relative_to(origin) } else { self }
     }
-}
-
-/// Whether a linear map only permutes, mirrors and scales by powers of two: then nothing rounds.
-fn exact(m: rt_geom::glam::DMat3) -> bool {
-    let power_of_two = |x: f64| x.to_bits() << 12 == 0; // or zero
-    m.to_cols_array().into_iter().all(power_of_two)
-        && [m.x_axis, m.y_axis, m.z_axis]
-            .into_iter()
-            .all(|c| c.to_array().iter().filter(|x| **x == 0.0).count() == 2)
 }
 
 /// `x - origin` rounded down to `f32`, `-inf` beyond reach. NaN stays NaN.

@@ -22,19 +22,29 @@
 //! yet, because the conservative test costs no operation more.
 
 mod aabb;
-mod moving;
-mod overlap;
 mod cloud;
+mod double;
+mod lanes;
+mod moving;
 mod obb;
+mod octet;
+mod overlap;
 mod slab;
 mod sphere;
 mod unit_ray;
 mod volume;
 
 pub use aabb::Aabb;
-pub use overlap::{BeamTest, ConeTest};
+pub use double::DAabb;
+pub use lanes::{Eight, Lanes, Portable};
 pub use obb::Obb;
+pub use octet::{BoxOctet, WideRay};
+pub use overlap::{BeamTest, ConeTest};
 pub use slab::{BoxPair, SlabRay};
 pub use sphere::{BoundingSphere, Extremes};
 pub use unit_ray::UnitRay;
 pub use volume::BoundingVolume;
+
+#[cfg(feature = "simd")]
+#[doc(hidden)]
+pub use fearless_simd;

@@ -34,16 +34,16 @@ const SLACK: f64 = 6.0 / (1u64 << 24) as f64;
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
     /// For each axis: near origin twice, far origin twice.
-    origin: [Vec4; 3],
+    pub(crate) origin: [Vec4; 3],
     /// For each axis: near reciprocal twice, negated far reciprocal twice.
-    inverse: [Vec4; 3],
+    pub(crate) inverse: [Vec4; 3],
     /// Whether the direction is negative along each axis: then `max` is the near plane.
-    negative: [bool; 3],
+    pub(crate) negative: [bool; 3],
     /// `t` of the caller to distance here: `(t - start) * unit`.
     start: f64,
     unit: f64,
-    near: f32,
-    far: f32,
+    pub(crate) near: f32,
+    pub(crate) far: f32,
 }
 
 /// Two boxes side by side, in the order the slab test reads them: for each axis the two `min`, then the two `max`.

@@ -3,9 +3,9 @@
 use rt_accel::Instance;
 use rt_bvh::{Builder, Bvh, BvhParams};
 use rt_geom::glam::DVec3;
-use rt_geom::{Real, Transform};
+use rt_geom::{Ray, Real, Transform};
 use rt_measure::conform;
-use rt_measure::rays::troublesome;
+use rt_measure::rays::{self, troublesome};
 use rt_scenes::{SceneGeometry, Solid, Trial};
 
 /// The default, and trees as bad as the parameters can make them.
@@ -89,6 +89,53 @@ fn on_instances_of_instances() {
         conform::conform::<Bvh, f64, _>("field of rows", &field, &params, &rays)
             .unwrap_or_else(|why| panic!("{why}"));
     }
+}
+
+#[test]
+fn on_turned_instances_seen_from_very_far() {
+    use rt_accel::{Aggregate, Exhaustive, Primitive};
+    use std::sync::Arc;
+    let torus = rt_scenes::soup::torus(6, 5, 0.3);
+    let corners = Trial { name: String::new(), mesh: torus.clone() }.points();
+    let torus = Arc::new(Aggregate::<Bvh, _>::build(torus, &BvhParams::default()).unwrap());
+    let maps: Vec<Transform> = (0..3)
+        .map(|i| {
+            let turn = if i == 0 { std::f64::consts::FRAC_PI_2 } else { 0.7 * i as f64 };
+            Transform::rotation(DVec3::new(1.0, 0.3 * i as f64, 0.0), turn)
+                .and_then(|t| {
+                    t.then(&Transform::translation(DVec3::new(30.0 * i as f64, 20.0 * i as f64, 9.1)))
+                })
+                .unwrap()
+        })
+        .collect();
+    let field: Vec<_> = maps.iter().map(|map| Instance::new(torus.clone(), *map)).collect();
+    let tree =
+        Aggregate::<Bvh, _>::build(field.clone(), &BvhParams { leaf_prims: 1, ..BvhParams::default() })
+            .unwrap();
+    let each = Aggregate::<Exhaustive, _>::build(field, &()).unwrap();
+    // Beside the outline of each instance, by less than the ray inside is off.
+    let mut seeded = rays::Seeded::new(9);
+    let mut hits = 0;
+    for case in 0..4000 {
+        let (map, axis) = (&maps[case % 3], case / 3 % 3);
+        let sign = [1.0, -1.0][case / 9 % 2];
+        let carried = corners.iter().map(|p| map.point(*p));
+        let outer = carried.max_by(|p, q| (sign * p[axis]).total_cmp(&(sign * q[axis]))).unwrap();
+        let along = (axis + 1 + case / 18 % 2) % 3;
+        let distance = [1e8, -1e10, 1e13][case / 36 % 3];
+        let off = 10f64.powf(seeded.between(-18.0, -13.0)) * f64::abs(distance);
+        let (mut origin, mut dir) = (outer, DVec3::ZERO);
+        origin[axis] += if seeded.below(2) == 0 { sign * off } else { -sign * off };
+        origin[3 - axis - along] += seeded.between(-off, off);
+        origin[along] -= distance;
+        dir[along] = f64::signum(distance);
+        let ray = Ray::new(origin, dir);
+        let found = each.intersect(&ray);
+        assert_eq!(tree.intersect(&ray), found, "{}", conform::paste(&ray));
+        assert_eq!(tree.intersect_p(&ray), found.is_some());
+        hits += usize::from(found.is_some());
+    }
+    assert!(hits > 100, "{hits} hits");
 }
 
 #[test]

@@ -5,9 +5,9 @@ use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Bounded, Geometry, Hit};
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::{DVec2, DVec3, Vec3A};
-use rt_geom::{Ray, Real, gamma};
+use rt_geom::{Ray, Real, Transform, gamma};
 
 /// Triangles over shared vertices, in world space, of `f32` or `f64` coordinates.
 ///
@@ -210,6 +210,10 @@ impl<V: Real> Bounded for TriangleMesh<V> {
             }
             _ => Aabb::EMPTY,
         }
+    }
+
+    fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
+        DAabb::around_carried(self.get(prim).map_or([DVec3::NAN; 3], |triangle| triangle.corners), map)
     }
 }
 
