@@ -22,12 +22,17 @@
 //! yet, because the conservative test costs no operation more.
 
 mod aabb;
+mod hull;
+mod kdop;
 mod moving;
 mod overlap;
 mod slab;
+mod solid;
 mod volume;
 
 pub use aabb::Aabb;
+pub use hull::{Hull, HullError, Polytope, PolytopeRay};
+pub use kdop::{Kdop, KdopRay};
 pub use overlap::{BeamTest, ConeTest};
 pub use slab::{BoxPair, SlabRay};
 pub use volume::BoundingVolume;

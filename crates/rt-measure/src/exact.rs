@@ -21,11 +21,13 @@
 //! ```
 
 mod aabb;
+mod plane;
 mod rational;
 mod sphere;
 mod triangle;
 
 pub use aabb::{Span, aabb};
+pub use plane::{Plane, convex, convex_met, side};
 pub use rational::Rational;
 pub use sphere::sphere;
 pub use triangle::{Closest, Corners, Root, closest, crosses, crossings, triangle};
