@@ -418,26 +418,24 @@ impl Wrapping<'_> {
     /// The facet to the left of the edge from `u` to `v`, whose ends are corners, and whether all points lie in its plane.
     fn facet(&self, u: u32, v: u32) -> (Vec<u32>, bool) {
         let p = |i: u32| self.at[i as usize];
-        let mut plane = None;
         let mut in_plane = vec![u, v];
-        let mut flat = true;
-        let mut third = u;
-        for i in 0..self.at.len() as u32 {
+        // Points on the edge's own line are no corners.
+        let count = self.at.len() as u32;
+        let Some(first) = (0..count).find(|i| !collinear(p(u), p(v), p(*i))) else { return (in_plane, true) };
+        in_plane.push(first);
+        let (mut plane, mut flat, mut third) = (self.plane(u, v, first), true, first);
+        for (i, at) in (0..).zip(self.at).skip(first as usize + 1) {
+            if plane.is_clearly_below(*at) {
+                flat = false;
+                continue;
+            }
             if i == u || i == v {
                 continue;
             }
-            let Some(found) = &plane else {
-                // Points on the edge's own line are no corners.
-                if !collinear(p(u), p(v), p(i)) {
-                    (third, plane) = (i, Some(self.plane(u, v, i)));
-                    in_plane.push(i);
-                }
-                continue;
-            };
-            match found.side(p(i)) {
+            match plane.side(*at) {
                 0 => in_plane.push(i),
                 1 => {
-                    (third, plane, flat) = (i, Some(self.plane(u, v, i)), false);
+                    (third, plane, flat) = (i, self.plane(u, v, i), false);
                     in_plane.truncate(2);
                     in_plane.push(i);
                 }

@@ -401,12 +401,18 @@ fn climb(n: DVec3, d: DVec3, unit: f64) -> Option<f64> {
     if d.abs().max_element() > f64::MAX / 16.0 {
         return None;
     }
-    let sum: Expansion<3> =
-        Expansion::<2>::difference(n.x * d.x, -n.y * d.y).plus(&Expansion::<1>::new(n.z * d.z));
-    let exact = sum.value();
+    let (s, e) = two_sum(n.x * d.x, n.y * d.y);
+    let (t, f) = two_sum(s, n.z * d.z);
+    let exact = if e == 0.0 && f == 0.0 { t } else { sum(n * d) };
     let climb = exact / unit;
     // Units are powers of two; what underflows keeps its sign and is as good as level.
     Some(if climb == 0.0 && exact != 0.0 { f64::from_bits(1).copysign(exact) } else { climb })
+}
+
+/// The sum of the components, which has the sign of the exact sum and an error of a few units in the last place.
+#[cold]
+fn sum(v: DVec3) -> f64 {
+    Expansion::<2>::difference(v.x, -v.y).plus::<1, 3>(&Expansion::new(v.z)).value()
 }
 
 impl<const K: usize> BoundingVolume for Kdop<K> {

@@ -56,26 +56,26 @@ impl Solid {
         if self.faces.iter().all(|face| matches!(place(face, n, d, tolerance), Place::Inside)) {
             return false;
         }
-        let mut rim = Vec::new();
+        let (mut rim, mut kept) = (Vec::with_capacity(16), Vec::with_capacity(8));
         self.faces.retain_mut(|face| {
             match place(face, n, d, tolerance) {
                 Place::Inside => {}
                 Place::Outside => return false,
                 Place::Across => {
-                    let mut kept = Vec::with_capacity(face.len() + 1);
+                    kept.clear();
                     clip(face, n, d, tolerance, |p, on_plane| {
                         kept.push(p);
                         if on_plane {
                             rim.push(p);
                         }
                     });
-                    *face = kept;
+                    core::mem::swap(face, &mut kept);
                 }
             }
             true
         });
         if rim.len() >= 3 {
-            self.faces.push(around(rim, n));
+            self.faces.push(around(&rim, n));
         }
         true
     }
@@ -140,17 +140,22 @@ fn area_vector_below(face: &[DVec3], n: DVec3, d: f64, tolerance: f64) -> DVec3 
 }
 
 /// The points of a convex polygon in order around `n`.
-fn around(mut points: Vec<DVec3>, n: DVec3) -> Vec<DVec3> {
+fn around(points: &[DVec3], n: DVec3) -> Vec<DVec3> {
     let middle = points.iter().copied().sum::<DVec3>() / points.len() as f64;
     let side = if n.x.abs() < 0.5 { DVec3::X } else { DVec3::Y };
-    let u = n.cross(side).normalize_or_zero();
+    let u = n.cross(side);
     let v = n.cross(u);
-    let angle = |p: &DVec3| {
-        let (x, y) = ((*p - middle).dot(u), (*p - middle).dot(v));
-        y.atan2(x)
+    // Grows with the angle: no need for the angle itself.
+    let turn = |p: DVec3| {
+        let (x, y) = ((p - middle).dot(u), (p - middle).dot(v));
+        let along = x / (x.abs() + y.abs());
+        if y < 0.0 { along - 1.0 } else { 1.0 - along }
     };
-    points.sort_by(|p, q| angle(p).total_cmp(&angle(q)));
-    points
+    let mut sorted: Vec<(f64, DVec3)> = points.iter().map(|p| (turn(*p), *p)).collect();
+    sorted.sort_unstable_by(|p, q| p.0.total_cmp(&q.0));
+    // Each corner was found by two faces.
+    sorted.dedup_by(|p, q| p.1 == q.1);
+    sorted.into_iter().map(|(_, p)| p).collect()
 }
 
 /// The area of the solid of unit normals and offsets in a box with finite corners; 0 where nothing is left.

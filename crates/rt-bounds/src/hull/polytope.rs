@@ -3,13 +3,19 @@
 use super::{Hull, extreme, scaled, without_inner};
 use crate::{Aabb, BoundingVolume, Kdop, KdopRay, solid, solid::Solid};
 use rt_geom::expansion::Expansion;
-use rt_geom::glam::DVec3;
-use rt_geom::{Ray, Real, Vector, f32_above, f32_below};
+use rt_geom::glam::{DVec3, Vec4};
+use rt_geom::{Ray, Real, Vector, f32_above};
 
-/// Beyond this size a coordinate of the ray's origin says nothing.
-const FAR: f64 = (1u128 << 126) as f64;
+/// Beyond this size a coordinate of the ray's origin says nothing: sums of three products stay finite.
+const FAR: f64 = (1u128 << 124) as f64;
+/// Planes further off than this are left out.
+const REACH: f64 = (1u128 << 127) as f64;
 /// Added to offsets, so that a product that underflows is still rounded outward.
-const STEP: f64 = f64::from_bits((1023 - 900) << 52);
+const STEP: f64 = 1.0 / (1u128 << 120) as f64;
+/// Eight roundings of `f32`.
+const ROUNDINGS: f64 = 8.0 / (1u64 << 24) as f64;
+/// Added to a support in `f64`, for products that underflow.
+const TINY: f64 = f64::from_bits((1023 - 900) << 52);
 /// The planes of [`Polytope`]'s `around`, box included.
 const AROUND: usize = 32;
 /// With more points than this left, `around` looks at the extreme ones in some directions only.
@@ -202,9 +208,9 @@ fn support<V: Vector>(n: [f32; 3], points: &[V], origin: DVec3) -> f32 {
         size = size.max((p.abs() + origin.abs()).element_sum());
     }
     // Five roundings, with components up to 1.
-    let error = size * (8.0 * f64::EPSILON) + STEP;
+    let error = size * (8.0 * f64::EPSILON) + TINY;
     let (low, high) = (f32_above(most - error), f32_above(most + error));
-    if most.is_nan() || most + error > 2.0 * FAR {
+    if most.is_nan() || most + error > REACH {
         return f32::INFINITY;
     }
     if low == high {
@@ -279,18 +285,20 @@ fn choose(mut normals: Vec<[f32; 3]>, hull: &Hull, b: &Aabb, count: usize, origi
     chosen
 }
 
-/// What a traversal derives from a ray, once, for polytopes: what it derives for their boxes, and the ray in `f64`.
+/// What a traversal derives from a ray, once, for polytopes: what it derives for their boxes, and the ray in `f32` with
+/// bounds of its error.
 ///
 /// Entries are distances as those of [`SlabRay`](crate::SlabRay). A ray that is not [valid](Ray::is_valid) meets nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct PolytopeRay {
     axes: KdopRay<6>,
-    origin: [f64; 3],
-    dir: [f64; 3],
-    /// What `n . origin` may be wrong by, and more than that by the roundings of a plane's test.
-    reach: f64,
+    /// The origin and the direction, each component four times.
+    origin: [Vec4; 3],
+    dir: [Vec4; 3],
+    /// What `n . origin` and the roundings after it may be wrong by.
+    reach: Vec4,
     /// What `n . dir` may be wrong by.
-    turn: f64,
+    turn: Vec4,
 }
 
 impl PolytopeRay {
@@ -302,16 +310,18 @@ impl PolytopeRay {
         let shift = if start == 0.0 { DVec3::ZERO } else { d * start };
         let at = (o - origin) + shift;
         let dir = d / unit;
-        let lost = (o.abs() + shift.abs() + origin.abs()).element_sum();
-        let near = at.abs().max_element() <= FAR && lost <= FAR * FAR;
-        let reach =
-            if near { (lost + at.abs().element_sum()) * (8.0 * f64::EPSILON) + STEP } else { f64::INFINITY };
+        // Of f64, on the way to `at`.
+        let lost = (o.abs() + shift.abs() + origin.abs()).element_sum() * (4.0 * f64::EPSILON);
+        let near = at.abs().max_element() <= FAR && lost <= FAR;
+        // Of f32: one for the component, three for the dot product; as many again for what the difference then adds.
+        let reach = if near { at.abs().element_sum() * ROUNDINGS + lost + STEP } else { f64::INFINITY };
+        let splat = |v: DVec3| v.to_array().map(|x| Vec4::splat(x as f32));
         PolytopeRay {
             axes,
-            origin: if near { at.to_array() } else { [0.0; 3] },
-            dir: dir.to_array(),
-            reach,
-            turn: dir.abs().element_sum() * (8.0 * f64::EPSILON) + STEP,
+            origin: splat(if near { at } else { DVec3::ZERO }),
+            dir: splat(dir),
+            reach: Vec4::splat(f32_above(reach)),
+            turn: Vec4::splat(f32_above(dir.abs().element_sum() * ROUNDINGS + STEP)),
         }
     }
 
@@ -335,22 +345,19 @@ impl Block {
     /// more than their roundings, that holds for all `t >= 0` where it holds exactly, and the quotient bounds `t` from above
     /// or from below by the sign of the divisor: also for a ray that is parallel to the plane as far as one can tell.
     #[inline(always)]
-    fn narrow(&self, ray: &PolytopeRay, t0: &mut [f64; 4], t1: &mut [f64; 4]) {
-        // The roundings of the quotient and of the difference before it.
-        const SHRINK: f64 = 1.0 - 4.0 * f64::EPSILON;
-        const GROW: f64 = 1.0 + 4.0 * f64::EPSILON;
-        for l in 0..4 {
-            let n = [self.n[0][l] as f64, self.n[1][l] as f64, self.n[2][l] as f64];
-            let at = n[0] * ray.origin[0] + n[1] * ray.origin[1] + n[2] * ray.origin[2];
-            let along = n[0] * ray.dir[0] + n[1] * ray.dir[1] + n[2] * ray.dir[2] - ray.turn;
-            let t = ((self.d[l] as f64 - at) + ray.reach) / along;
-            let leaves = along >= 0.0;
-            let (enter, exit) =
-                if leaves { (f64::NEG_INFINITY, t * GROW) } else { (t * SHRINK, f64::INFINITY) };
-            // Comparisons that drop NaN.
-            t0[l] = if enter > t0[l] { enter } else { t0[l] };
-            t1[l] = if exit < t1[l] { exit } else { t1[l] };
-        }
+    fn narrow(&self, ray: &PolytopeRay, t0: Vec4, t1: Vec4) -> (Vec4, Vec4) {
+        // The roundings of the difference, the quotient and the product: four, and two more.
+        const SHRINK: f32 = 1.0 - 3.0 * f32::EPSILON;
+        const GROW: f32 = 1.0 + 3.0 * f32::EPSILON;
+        let [x, y, z] = self.n.map(Vec4::from_array);
+        let at = x * ray.origin[0] + y * ray.origin[1] + z * ray.origin[2];
+        let along = (x * ray.dir[0] + y * ray.dir[1] + z * ray.dir[2]) - ray.turn;
+        let t = ((Vec4::from_array(self.d) - at) + ray.reach) / along;
+        let leaves = along.cmpge(Vec4::ZERO);
+        // The product first: a NaN is dropped.
+        let enter = Vec4::select(leaves, Vec4::NEG_INFINITY, t * SHRINK).max(t0);
+        let exit = Vec4::select(leaves, t * GROW, Vec4::INFINITY).min(t1);
+        (enter, exit)
     }
 }
 
@@ -386,17 +393,14 @@ impl BoundingVolume for Polytope {
     #[inline]
     fn entry(&self, ray: &PolytopeRay) -> Option<f32> {
         let (entry, exit) = self.bounds.span(&ray.axes)?;
-        let (mut t0, mut t1) = ([entry as f64; 4], [exit as f64; 4]);
+        let (mut t0, mut t1) = (Vec4::splat(entry), Vec4::splat(exit));
         for block in &self.blocks {
-            block.narrow(ray, &mut t0, &mut t1);
-            let enter = t0[0].max(t0[1]).max(t0[2].max(t0[3]));
-            let exit = t1[0].min(t1[1]).min(t1[2].min(t1[3]));
-            if enter > exit {
+            (t0, t1) = block.narrow(ray, t0, t1);
+            if t0.max_element() > t1.min_element() {
                 return None;
             }
         }
-        let enter = t0[0].max(t0[1]).max(t0[2].max(t0[3]));
-        Some(f32_below(enter))
+        Some(t0.max_element())
     }
 
     /// The area of the faces that the stored planes truly have.
