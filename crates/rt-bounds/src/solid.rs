@@ -8,9 +8,24 @@ use rt_geom::glam::DVec3;
 /// polygon on its own, and the new face is what the cuts left open.
 #[derive(Clone, Debug)]
 pub(crate) struct Solid {
-    faces: Vec<Vec<DVec3>>,
+    faces: Vec<Face>,
     /// What counts as on a plane: some roundings of the largest coordinate.
     tolerance: f64,
+}
+
+/// A polygon, its area times its normal, and its area.
+#[derive(Clone, Debug)]
+struct Face {
+    corners: Vec<DVec3>,
+    vector: DVec3,
+    area: f64,
+}
+
+impl Face {
+    fn new(corners: Vec<DVec3>) -> Face {
+        let vector = area_vector(&corners);
+        Face { corners, vector, area: vector.length() }
+    }
 }
 
 impl Solid {
@@ -24,13 +39,13 @@ impl Solid {
             )
         };
         let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        let faces = faces.map(|face| face.map(corner).to_vec()).to_vec();
+        let faces = faces.map(|face| Face::new(face.map(corner).to_vec())).to_vec();
         Solid { faces, tolerance: min.abs().max(max.abs()).max_element() * (16.0 * f64::EPSILON) }
     }
 
     /// The sum of the areas of the faces.
     pub(crate) fn area(&self) -> f64 {
-        self.faces.iter().map(|face| area_vector(face).length()).sum()
+        self.faces.iter().map(|face| face.area).sum()
     }
 
     /// The area that is left after [`Solid::cut`], without cutting; `n` is a unit vector.
@@ -39,13 +54,16 @@ impl Solid {
     pub(crate) fn area_if_cut(&self, n: DVec3, d: f64) -> f64 {
         let (mut area, mut open) = (0.0, DVec3::ZERO);
         for face in &self.faces {
-            let kept = match place(face, n, d, self.tolerance) {
-                Place::Inside => area_vector(face),
+            let (vector, size) = match place(&face.corners, n, d, self.tolerance) {
+                Place::Inside => (face.vector, face.area),
                 Place::Outside => continue,
-                Place::Across => area_vector_below(face, n, d, self.tolerance),
+                Place::Across => {
+                    let vector = area_vector_below(&face.corners, n, d, self.tolerance);
+                    (vector, vector.length())
+                }
             };
-            area += kept.length();
-            open += kept;
+            area += size;
+            open += vector;
         }
         area + (-open.dot(n)).max(0.0)
     }
@@ -53,29 +71,29 @@ impl Solid {
     /// Keeps what satisfies `n . x <= d`, for a unit `n`; whether anything was cut off.
     pub(crate) fn cut(&mut self, n: DVec3, d: f64) -> bool {
         let tolerance = self.tolerance;
-        if self.faces.iter().all(|face| matches!(place(face, n, d, tolerance), Place::Inside)) {
+        if self.faces.iter().all(|face| matches!(place(&face.corners, n, d, tolerance), Place::Inside)) {
             return false;
         }
-        let (mut rim, mut kept) = (Vec::with_capacity(16), Vec::with_capacity(8));
+        let mut rim = Vec::with_capacity(16);
         self.faces.retain_mut(|face| {
-            match place(face, n, d, tolerance) {
+            match place(&face.corners, n, d, tolerance) {
                 Place::Inside => {}
                 Place::Outside => return false,
                 Place::Across => {
-                    kept.clear();
-                    clip(face, n, d, tolerance, |p, on_plane| {
+                    let mut kept = Vec::with_capacity(face.corners.len() + 1);
+                    clip(&face.corners, n, d, tolerance, |p, on_plane| {
                         kept.push(p);
                         if on_plane {
                             rim.push(p);
                         }
                     });
-                    core::mem::swap(face, &mut kept);
+                    *face = Face::new(kept);
                 }
             }
             true
         });
         if rim.len() >= 3 {
-            self.faces.push(around(&rim, n));
+            self.faces.push(Face::new(around(&rim, n)));
         }
         true
     }

@@ -77,7 +77,7 @@ impl Hull {
     ///
     /// Fewer than six are not offered: four planes of a tetrahedron take 16 floats and 8 dot products, the box 6 and none.
     ///
-    /// Cost: after the hull, some `k` cuts for each of the most promising facets, milliseconds for 2000 facets and `k = 64`.
+    /// Cost: after the hull, some `k` cuts for each of the most promising facets, 0.1 s for 2000 facets and `k = 64`.
     pub fn reduced(&self, k: usize, origin: DVec3) -> Polytope {
         Polytope::between(self.directions(), self, Some(k.saturating_sub(6)), self.corners(), origin)
     }
@@ -128,7 +128,7 @@ impl Polytope {
         let side = |i: usize| {
             let (a, (lo, hi)) = (i / 2, self.bounds.extent(i / 2));
             let mut plane = [0.0; 4];
-            (plane[a], plane[3]) = if i % 2 == 0 { (-1.0, -lo) } else { (1.0, hi) };
+            (plane[a], plane[3]) = if i.is_multiple_of(2) { (-1.0, -lo) } else { (1.0, hi) };
             plane
         };
         (0..6).map(side).chain((0..self.count).map(|i| self.blocks[i / 4].plane(i % 4)))
@@ -149,7 +149,7 @@ impl Polytope {
         let chosen: Vec<[f32; 3]> = match limit {
             None => directions.collect(),
             Some(0) => Vec::new(),
-            Some(count) => choose(directions.collect(), hull, &b, count, origin),
+            Some(count) => choose(&directions.collect::<Vec<_>>(), hull, &b, count, origin),
         };
         for n in chosen {
             let d = support(n, points, origin);
@@ -236,10 +236,14 @@ fn exceeds(n: [f32; 3], p: DVec3, origin: DVec3, d: f32) -> bool {
     xy.plus::<5, 13>(&z).sign() > 0
 }
 
-/// The normals that cut the most area of the box, one after another.
+/// The normals of `count` planes that together leave little of the box.
 ///
-/// What a plane cuts only shrinks as others cut before it (nearly so), so it is reckoned again only where it may be the most.
-fn choose(mut normals: Vec<[f32; 3]>, hull: &Hull, b: &Aabb, count: usize, origin: DVec3) -> Vec<[f32; 3]> {
+/// First those that cut the most area, one after another. What a plane cuts only shrinks as others cut before it (nearly so),
+/// so it is reckoned again only where it may be the most.
+///
+/// Tried and left out: taking three times as many planes and then dropping those missed least (areas within 2 % either way,
+/// a hundred times slower), and exchanging planes until nothing falls (areas at most 1 % less).
+fn choose(normals: &[[f32; 3]], hull: &Hull, b: &Aabb, count: usize, origin: DVec3) -> Vec<[f32; 3]> {
     let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
     let (middle, size) = (min * 0.5 + max * 0.5, (max * 0.5 - min * 0.5).max_element());
     if !(size > 0.0 && size.is_finite()) {
@@ -247,42 +251,31 @@ fn choose(mut normals: Vec<[f32; 3]>, hull: &Hull, b: &Aabb, count: usize, origi
     }
     let scaled = |p: DVec3| (p - middle) / size;
     let corners: Vec<DVec3> = hull.corners().iter().map(|p| scaled(*p - origin)).collect();
-    let plane = |n: [f32; 3]| {
+    let plane = |n: &[f32; 3]| {
         let n = DVec3::from_array(n.map(f64::from)).normalize();
         (n, corners.iter().fold(f64::NEG_INFINITY, |d, p| d.max(n.dot(*p))))
     };
+    let planes: Vec<(DVec3, f64)> = normals.iter().map(plane).collect();
     let mut solid = Solid::cuboid(scaled(min), scaled(max));
-    let mut area = solid.area();
-    struct Candidate {
-        n: DVec3,
-        d: f64,
-        gain: f64,
-        round: usize,
-    }
-    let reckon = |n: &[f32; 3]| {
-        let (n, d) = plane(*n);
-        Candidate { n, d, gain: area - solid.area_if_cut(n, d), round: 0 }
-    };
-    let mut candidates: Vec<Candidate> = normals.iter().map(reckon).collect();
-    let mut chosen = Vec::new();
+    let mut gains: Vec<(f64, usize)> =
+        planes.iter().map(|(n, d)| (solid.area() - solid.area_if_cut(*n, *d), 0)).collect();
+    let mut chosen: Vec<usize> = Vec::new();
     while chosen.len() < count {
-        let most = (0..candidates.len()).max_by(|i, j| candidates[*i].gain.total_cmp(&candidates[*j].gain));
-        let Some(i) = most else { break };
-        let c = &mut candidates[i];
+        let Some(i) = (0..gains.len()).max_by(|i, j| gains[*i].0.total_cmp(&gains[*j].0)) else { break };
+        let ((n, d), area) = (planes[i], solid.area());
         // Less than the roundings of planes to `f32` is no gain.
-        if c.gain.is_nan() || c.gain <= area * 1e-9 {
+        if gains[i].0.is_nan() || gains[i].0 <= area * 1e-9 {
             break;
         }
-        if c.round < chosen.len() {
-            (c.gain, c.round) = (area - solid.area_if_cut(c.n, c.d), chosen.len());
+        if gains[i].1 < chosen.len() {
+            gains[i] = (area - solid.area_if_cut(n, d), chosen.len());
             continue;
         }
-        solid.cut(c.n, c.d);
-        area = solid.area();
-        chosen.push(normals.swap_remove(i));
-        candidates.swap_remove(i);
+        solid.cut(n, d);
+        chosen.push(i);
+        gains[i].0 = 0.0;
     }
-    chosen
+    chosen.into_iter().map(|i| normals[i]).collect()
 }
 
 /// What a traversal derives from a ray, once, for polytopes: what it derives for their boxes, and the ray in `f32` with
@@ -365,8 +358,8 @@ impl BoundingVolume for Polytope {
     type Ready = PolytopeRay;
 
     /// Thirty-two planes around the points: the box and the facets of their hull that cut the most area. Of more than some
-    /// thousand points on the hull a few hundred stand for all in the choice of facets, so this takes milliseconds for
-    /// thousands of points and a second for millions, whatever their shape.
+    /// thousand points on the hull a few hundred stand for all in the choice of facets, so this takes 0.2 s at most for 10^5
+    /// points, whatever their shape, and 0.06 ms for eight.
     fn around<V: Vector>(points: &[V], origin: DVec3) -> Option<Polytope> {
         let all: Vec<DVec3> = points.iter().map(|p| p.widen()).collect();
         if all.is_empty() || all.iter().any(|p| !p.is_finite()) {
