@@ -24,6 +24,8 @@
 mod aabb;
 mod cloud;
 mod double;
+mod hull;
+mod kdop;
 mod lanes;
 mod moving;
 mod obb;
@@ -39,6 +41,12 @@ pub use double::DAabb;
 pub use lanes::{Eight, Lanes, Portable};
 pub use obb::Obb;
 pub use octet::{BoxOctet, WideRay};
+mod solid;
+mod volume;
+
+pub use aabb::Aabb;
+pub use hull::{Hull, HullError, Polytope, PolytopeRay};
+pub use kdop::{Kdop, KdopRay};
 pub use overlap::{BeamTest, ConeTest};
 pub use slab::{BoxPair, SlabRay};
 pub use sphere::{BoundingSphere, Extremes};

@@ -151,26 +151,10 @@ impl SlabRay {
             let exact = start == 0.0 && (origin[a] == 0.0 || x + origin[a] == o[a] && o[a] - x == origin[a]);
             let error =
                 if exact { 0.0 } else { (o[a].abs() + shift.abs() + origin[a].abs()) * (4.0 * f64::EPSILON) };
-            let error = if x.abs() < NEAR { error + STEP } else { error };
-            let (below, above) = if x.abs() + error <= FAR {
-                (f32_below(x - error), f32_above(x + error))
-            } else {
-                (f32::NEG_INFINITY, f32::INFINITY)
-            };
-            let r = 1.0 / dir[a];
-            let negative = r < 0.0;
-            let near = ((r.abs() * (1.0 - SLACK)) as f32).min(f32::MAX);
-            let far = (r.abs() * (1.0 + SLACK)) as f32;
-            // Seen along the direction: the near origin lies ahead, the far origin behind.
-            let (ahead, behind, sign) = if negative { (below, above, -1.0) } else { (above, below, 1.0) };
-            let behind = match (far.is_infinite(), negative) {
-                (false, _) => behind,
-                (true, false) => behind.next_down(),
-                (true, true) => behind.next_up(),
-            };
-            slab.origin[a] = Vec4::new(ahead, ahead, behind, behind);
-            slab.inverse[a] = Vec4::new(near, near, -far, -far) * sign;
-            slab.negative[a] = negative;
+            let side = SlabSide::new(x, error, 1.0 / dir[a]);
+            slab.origin[a] = Vec4::new(side.ahead, side.ahead, side.behind, side.behind);
+            slab.inverse[a] = Vec4::new(side.near, side.near, -side.far, -side.far);
+            slab.negative[a] = side.negative;
         }
         slab.near = f32_below((t_min.next_down() - start).max(0.0) * unit) * (1.0 - SLACK as f32);
         slab.shorten(ray.t_max);
@@ -223,6 +207,25 @@ impl SlabRay {
         self.far
     }
 
+    /// The ray along an axis.
+    #[inline(always)]
+    pub(crate) fn side(&self, a: usize) -> SlabSide {
+        let (origin, inverse) = (self.origin[a], self.inverse[a]);
+        SlabSide {
+            ahead: origin.x,
+            behind: origin.z,
+            near: inverse.x,
+            far: -inverse.z,
+            negative: self.negative[a],
+        }
+    }
+
+    /// The least distance, the `t` it is measured from, and the power of two by which `t` becomes distance.
+    #[inline(always)]
+    pub(crate) fn scale(&self) -> (f32, f64, f64) {
+        (self.near, self.start, self.unit)
+    }
+
     /// [`SlabRay::entry`] of two boxes at once: which are met (bit 0 the left, bit 1 the right), and where.
     #[inline(always)]
     pub fn enter_pair(&self, pair: &BoxPair) -> (u32, [f32; 2]) {
@@ -241,6 +244,44 @@ impl SlabRay {
             t = ((planes - self.origin[a]) * self.inverse[a]).max(t);
         }
         t
+    }
+}
+
+/// A ray along one direction across slabs: what [`SlabRay`] holds for each axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SlabSide {
+    /// The origin for near planes.
+    pub(crate) ahead: f32,
+    /// The origin for far planes.
+    pub(crate) behind: f32,
+    /// The reciprocal for near planes, with its sign.
+    pub(crate) near: f32,
+    /// The reciprocal for far planes, with its sign.
+    pub(crate) far: f32,
+    /// Whether the ray descends: then the upper plane is the near one.
+    pub(crate) negative: bool,
+}
+
+impl SlabSide {
+    /// Encloses a ray that is at `x`, give or take `error`, and climbs by `1 / r` a unit of distance; `r` may be infinite.
+    pub(crate) fn new(x: f64, error: f64, r: f64) -> SlabSide {
+        let error = if x.abs() < NEAR { error + STEP } else { error };
+        let (below, above) = if x.abs() + error <= FAR {
+            (f32_below(x - error), f32_above(x + error))
+        } else {
+            (f32::NEG_INFINITY, f32::INFINITY)
+        };
+        let negative = r < 0.0;
+        let near = ((r.abs() * (1.0 - SLACK)) as f32).min(f32::MAX);
+        let far = (r.abs() * (1.0 + SLACK)) as f32;
+        // Seen along the direction: the near origin lies ahead, the far origin behind.
+        let (ahead, behind, sign) = if negative { (below, above, -1.0) } else { (above, below, 1.0) };
+        let behind = match (far.is_infinite(), negative) {
+            (false, _) => behind,
+            (true, false) => behind.next_down(),
+            (true, true) => behind.next_up(),
+        };
+        SlabSide { ahead, behind, near: near * sign, far: far * sign, negative }
     }
 }
 

@@ -22,6 +22,7 @@
 
 mod aabb;
 mod ball;
+mod plane;
 mod rational;
 mod slabs;
 mod sphere;
@@ -29,6 +30,7 @@ mod triangle;
 
 pub use aabb::{Span, aabb};
 pub use ball::{ball_holds, ball_meets, smallest_ball};
+pub use plane::{Plane, convex, convex_met, side};
 pub use rational::Rational;
 pub use slabs::{Slab, slabs, slabs_hold};
 pub use sphere::sphere;
