@@ -6,10 +6,11 @@
 //! once for all boxes; what is done once a candidate is in the time.
 
 use crate::contest::{Group, Measured, Mismatch, Weigh, mark_front};
+use crate::volumes::turn;
 use crate::{Effort, Trouble, Watch, hear};
 use core::hint::black_box;
 use rt_accel::{Aggregate, Exhaustive, Instance, Primitive, WorldBound};
-use rt_bounds::{Aabb, DAabb, SlabRay};
+use rt_bounds::{Aabb, BoundingVolume, DAabb, Obb, SlabRay, UnitRay};
 use rt_geom::glam::{DVec3, Vec3A};
 use rt_geom::{Ray, Transform};
 use rt_measure::clock::race;
@@ -65,9 +66,8 @@ struct Turned<'a> {
     solid: &'a Solid,
     to_world: Transform,
     to_object: Transform,
-    /// The rows of the map to the object's space, and where its zero lies: a slab each.
-    rows: [DVec3; 3],
-    zero: DVec3,
+    /// The object's box in the world.
+    slabs: Obb,
     /// In the world: of carried vertices, and of the carried box.
     tight: Aabb,
     loose: Aabb,
@@ -79,26 +79,10 @@ struct Shot {
     object: usize,
     ray: Ray,
     slab: SlabRay,
+    unit: UnitRay,
 }
 
 impl Turned<'_> {
-    /// Option 2: the slabs of the object's box, in the world, one after the other.
-    fn meets_slabs(&self, ray: &Ray) -> bool {
-        let (o, d) = (ray.origin.as_dvec3() - self.zero, ray.dir.as_dvec3());
-        let (mut enter, mut exit) = (ray.t_min as f64, ray.t_max as f64);
-        for a in 0..3 {
-            let (o, inverse) = (self.rows[a].dot(o), 1.0 / self.rows[a].dot(d));
-            let (p, q) = ((self.own.min[a] - o) * inverse, (self.own.max[a] - o) * inverse);
-            enter = enter.max(p.min(q));
-            exit = exit.min(p.max(q));
-            // Three roundings, and those of the rows: far below a millionth of a millionth.
-            if enter > exit * (1.0 + 1e-12) {
-                return false;
-            }
-        }
-        true
-    }
-
     /// Option 3: the ray in the object's space, if it meets the box there.
     fn meets_inside(&self, ray: &Ray) -> Option<Ray<f64>> {
         let inside = self.to_object.ray(ray);
@@ -120,18 +104,18 @@ struct Way {
 const WAYS: [Way; 7] = [
     Way {
         name: "1-world-box",
-        surface: |at| at.tight.surface_area() as f64,
+        surface: |at| f64::from(at.tight.surface_area()),
         ask: |at, shot| (1, world(at, shot, &at.tight)),
     },
     Way {
         name: "1b-carried-box",
-        surface: |at| at.loose.surface_area() as f64,
+        surface: |at| f64::from(at.loose.surface_area()),
         ask: |at, shot| (1, world(at, shot, &at.loose)),
     },
     Way {
         name: "2-slabs-in-world",
         surface: |at| at.own.relative_to(DVec3::ZERO).surface_area() as f64,
-        ask: |at, shot| (1, at.meets_slabs(&shot.ray).then(|| at.hit(&shot.ray))),
+        ask: |at, shot| (1, at.slabs.entry(&shot.unit).map(|_| at.hit(&shot.ray))),
     },
     Way {
         name: "3-object-box",
@@ -186,7 +170,8 @@ fn group(effort: Effort, name: &str, solid: &Solid, hull: f64) -> Result<Group, 
         let (center, half) = (at.to_world.point(DVec3::ZERO).as_vec3a(), Vec3A::splat(reach / 3f32.sqrt()));
         for ray in rays::uniform(object as u64, &Aabb::new(center - half, center + half), AT_EACH) {
             let slab = SlabRay::new(&ray, DVec3::ZERO, &at.loose);
-            shots.push(Shot { object, ray, slab });
+            let unit = Obb::ready(&ray, DVec3::ZERO, &at.loose);
+            shots.push(Shot { object, ray, slab, unit });
         }
     }
     let mut errors = [HitError::default(); WAYS.len()];
@@ -228,33 +213,20 @@ fn group(effort: Effort, name: &str, solid: &Solid, hull: f64) -> Result<Group, 
 
 fn turned<'a>(seeded: &mut Seeded, solid: &'a Solid) -> Result<Turned<'a>, Trouble> {
     let wrong = |why: rt_geom::TransformError| Trouble::Scene(why.to_string());
-    let (axis, angle) = rotation(seeded);
-    let turn = Transform::rotation(axis, angle).map_err(wrong)?;
+    let turn = Transform::from_quat(turn(seeded)).map_err(wrong)?;
     let place = Transform::translation(seeded.inside(DVec3::splat(-10.0), DVec3::splat(10.0)));
     let to_world = turn.then(&place).map_err(wrong)?;
-    let back = to_world.inverse().linear().transpose();
     let b = solid.world_bound();
     Ok(Turned {
         solid,
         to_world,
         to_object: to_world.inverse(),
-        rows: [back.x_axis, back.y_axis, back.z_axis],
-        zero: to_world.point(DVec3::ZERO),
+        slabs: Obb::carried(&b, &to_world, DVec3::ZERO)
+            .ok_or_else(|| Trouble::Scene("an object without a box".into()))?,
         tight: Instance::new(solid, to_world).world_bound(),
         loose: Instance::boxed(solid, to_world).world_bound(),
         own: DAabb { min: b.min.as_dvec3(), max: b.max.as_dvec3() },
     })
-}
-
-/// A rotation, uniform among all: a unit quaternion, drawn from the ball.
-fn rotation(seeded: &mut Seeded) -> (DVec3, f64) {
-    loop {
-        let v = seeded.inside(DVec3::NEG_ONE, DVec3::ONE);
-        let w = seeded.between(-1.0, 1.0);
-        if v.length_squared() > 1e-6 && v.length_squared() + w * w <= 1.0 {
-            return (v, 2.0 * v.length().atan2(w));
-        }
-    }
 }
 
 fn timed(
@@ -282,7 +254,7 @@ fn timed(
         let (bounds, asked, idle) = tallies[i];
         Measured {
             structure: way.name.into(),
-            params: format!("S={:.2} false={:.3}", surface(way), idle as f64 / n),
+            params: String::new(),
             build_ms: None,
             bytes_per_prim: None,
             ns_per_ray: race.median(i) / n,
@@ -293,6 +265,8 @@ fn timed(
             sah: None,
             error: errors[i],
             has_t: false,
+            void: None,
+            figures: vec![("S", surface(way)), ("false", idle as f64 / n)],
             on_front: false,
         }
     });

@@ -5,9 +5,9 @@
 //! predicted, and the prediction is compared with the time that bound and object take together.
 
 use crate::contest::{Group, Measured, Mismatch, Weigh, mark_front};
-use crate::{Effort, Trouble, Watch, hear};
+use crate::{Effort, Trouble, Watch, hear, space};
 use core::hint::black_box;
-use rt_bounds::{Aabb, BoundingVolume};
+use rt_bounds::{Aabb, BoundingSphere, BoundingVolume, Extremes, Hull, Kdop, Obb};
 use rt_geom::Ray;
 use rt_geom::glam::{DQuat, DVec3, Vec3A};
 use rt_measure::clock::{Plan, Race, quantile, race};
@@ -272,8 +272,23 @@ impl Stage {
 
 /// All volumes that are compared.
 fn entrants(stage: &Stage) -> Vec<Entrant<'_>> {
-    let all =
-        [stage.entrant("aabb", "", |object| <Aabb as BoundingVolume>::around(&object.corners, DVec3::ZERO))];
+    let all = [
+        stage.entrant("aabb", "", |o| Aabb::around(&o.corners, DVec3::ZERO)),
+        stage.entrant("sphere", "ritter", |o| BoundingSphere::ritter(&o.corners, DVec3::ZERO)),
+        stage.entrant("sphere", "epos-26", |o| {
+            BoundingSphere::epos(&o.corners, DVec3::ZERO, Extremes::TwentySix)
+        }),
+        stage.entrant("sphere", "smallest", |o| BoundingSphere::smallest(&o.corners, DVec3::ZERO)),
+        stage.entrant("obb", "pca", |o| Obb::pca(&o.corners, &[], DVec3::ZERO)),
+        stage.entrant("obb", "dito-14", |o| Obb::dito(&o.corners, DVec3::ZERO)),
+        stage.entrant("obb", "tight", |o| Obb::tight(&o.corners, DVec3::ZERO)),
+        stage.entrant("kdop-14", "", |o| Kdop::<14>::around(&o.corners, DVec3::ZERO)),
+        stage.entrant("kdop-18", "", |o| Kdop::<18>::around(&o.corners, DVec3::ZERO)),
+        stage.entrant("kdop-26", "", |o| Kdop::<26>::around(&o.corners, DVec3::ZERO)),
+        stage.entrant("hull", "planes=8", |o| Some(Hull::new(&o.corners).ok()?.reduced(8, DVec3::ZERO))),
+        stage.entrant("hull", "planes=16", |o| Some(Hull::new(&o.corners).ok()?.reduced(16, DVec3::ZERO))),
+        stage.entrant("hull", "", |o| Some(Hull::new(&o.corners).ok()?.polytope(DVec3::ZERO))),
+    ];
     all.into_iter().flatten().collect()
 }
 
@@ -281,11 +296,12 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
     let kinds = kinds();
     let mut groups = Vec::new();
     for (k, kind) in kinds.iter().enumerate() {
-        hear(watch, k, kinds.len())?;
+        // The last part is about spaces.
+        hear(watch, k, kinds.len() + 1)?;
         let stage = Stage::new(kind, effort);
         groups.extend(weigh(kind, &stage, effort.plan()));
     }
-    hear(watch, 1, 1)?;
+    groups.extend(space::ask(effort, watch)?);
     Ok(groups)
 }
 

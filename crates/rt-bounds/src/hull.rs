@@ -57,7 +57,7 @@ pub enum HullError {
     TooMany,
     /// The point of this number is infinite or NaN.
     NotFinite(u32),
-    /// A coordinate has digits more than `2^640` times smaller than the greatest coordinate: too far apart for exact signs.
+    /// A coordinate has digits more than `2^638` times smaller than the greatest coordinate: too far apart for exact signs.
     /// Impossible for `f32`.
     TooFarApart,
 }
@@ -68,7 +68,7 @@ impl fmt::Display for HullError {
             HullError::Empty => write!(f, "no points"),
             HullError::TooMany => write!(f, "more points than u32 can number"),
             HullError::NotFinite(i) => write!(f, "point {i} is not finite"),
-            HullError::TooFarApart => write!(f, "coordinates differ in size by more than 2^640"),
+            HullError::TooFarApart => write!(f, "coordinates differ in size by more than 2^638"),
         }
     }
 }

@@ -32,21 +32,18 @@ mod obb;
 mod octet;
 mod overlap;
 mod slab;
+mod solid;
 mod sphere;
 mod unit_ray;
 mod volume;
 
 pub use aabb::Aabb;
 pub use double::DAabb;
+pub use hull::{Hull, HullError, Polytope, PolytopeRay};
+pub use kdop::{Kdop, KdopRay};
 pub use lanes::{Eight, Lanes, Portable};
 pub use obb::Obb;
 pub use octet::{BoxOctet, WideRay};
-mod solid;
-mod volume;
-
-pub use aabb::Aabb;
-pub use hull::{Hull, HullError, Polytope, PolytopeRay};
-pub use kdop::{Kdop, KdopRay};
 pub use overlap::{BeamTest, ConeTest};
 pub use slab::{BoxPair, SlabRay};
 pub use sphere::{BoundingSphere, Extremes};
