@@ -62,7 +62,6 @@ mod queries;
 mod rivals;
 mod slab;
 // Part of the question `volumes`.
-#[allow(dead_code)]
 mod space;
 mod subject;
 mod volumes;
@@ -132,19 +131,19 @@ impl Question {
             (Question::Build, Effort::Quick) => 30,
             (Question::Precision, Effort::Quick) => 12,
             (Question::Slab, _) => 2,
-            (Question::Volumes, Effort::Quick) => 15,
+            (Question::Volumes, Effort::Quick) => 30,
             (Question::Rivals, Effort::Quick) => 25,
             (Question::Closest, Effort::Normal) => 90,
             (Question::Any, Effort::Normal) => 60,
             (Question::Build, Effort::Normal) => 170,
             (Question::Precision, Effort::Normal) => 40,
-            (Question::Volumes, Effort::Normal) => 60,
+            (Question::Volumes, Effort::Normal) => 150,
             (Question::Rivals, Effort::Normal) => 200,
             (Question::Closest, Effort::Full) => 360,
             (Question::Any, Effort::Full) => 240,
             (Question::Build, Effort::Full) => 600,
             (Question::Precision, Effort::Full) => 90,
-            (Question::Volumes, Effort::Full) => 240,
+            (Question::Volumes, Effort::Full) => 600,
             (Question::Rivals, Effort::Full) => 480,
         };
         Duration::from_secs(seconds)

@@ -299,7 +299,9 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
         // The last part is about spaces.
         hear(watch, k, kinds.len() + 1)?;
         let stage = Stage::new(kind, effort);
-        groups.extend(weigh(kind, &stage, effort.plan()));
+        // Short turns need many rounds.
+        let Plan { warm_up, rounds } = effort.plan();
+        groups.extend(weigh(kind, &stage, Plan { warm_up, rounds: 2 * rounds + 1 }));
     }
     groups.extend(space::ask(effort, watch)?);
     Ok(groups)
