@@ -83,7 +83,7 @@ impl SlabRay {
     /// The same ray, spread over lanes.
     #[inline(always)]
     pub fn wide<L: Lanes>(&self, lanes: L) -> WideRay<L> {
-        // Written out: closures given to `map` are compiled for the least of CPUs, and cost twenty times as much.
+        // Written out: closures given to `map` are compiled for the least of CPUs, and cost many times as much.
         let [[ax, _, bx, _], [ay, _, by, _], [az, _, bz, _]] =
             [self.origin[0].to_array(), self.origin[1].to_array(), self.origin[2].to_array()];
         let [[sx, _, fx, _], [sy, _, fy, _], [sz, _, fz, _]] =
