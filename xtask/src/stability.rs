@@ -92,6 +92,11 @@ struct Tally {
 }
 
 impl Tally {
+    /// Of a structure that was not built, and so finds nothing.
+    fn unbuilt() -> Tally {
+        Tally { hits: HitError { rays: 1, missed: 1, ..HitError::default() }, ..Tally::default() }
+    }
+
     fn falls_short(&self) -> bool {
         let HitError { missed, invented, wrong, t_ulp, .. } = self.hits;
         missed + invented + wrong + self.leaks + self.any + self.miscounted > 0
@@ -199,17 +204,20 @@ struct Ask<'a> {
 impl Job for Ask<'_> {
     type Out = [Tally; 2];
 
-    fn run<S: Structure + 'static>(self) -> [Tally; 2] {
+    fn run<S: Structure + 'static>(self, params: &S::Params) -> [Tally; 2] {
         let inside = self.case.inside;
         match &self.case.mesh {
             Mesh::Single(mesh) => [
-                ask_mesh::<S, f32, f32>(mesh, inside, self.seed),
-                ask_mesh::<S, f32, f64>(mesh, inside, self.seed),
+                ask_mesh::<S, f32, f32>(mesh, params, inside, self.seed),
+                ask_mesh::<S, f32, f64>(mesh, params, inside, self.seed),
             ],
-            Mesh::Double(mesh) => [Tally::default(), ask_mesh::<S, f64, f64>(mesh, inside, self.seed)],
-            Mesh::Spheres(balls) => {
-                [ask_spheres::<S, f32>(balls, self.seed), ask_spheres::<S, f64>(balls, self.seed)]
+            Mesh::Double(mesh) => {
+                [Tally::default(), ask_mesh::<S, f64, f64>(mesh, params, inside, self.seed)]
             }
+            Mesh::Spheres(balls) => [
+                ask_spheres::<S, f32>(balls, params, self.seed),
+                ask_spheres::<S, f64>(balls, params, self.seed),
+            ],
         }
     }
 }
@@ -233,12 +241,13 @@ fn troublesome<R: Real>(world: &Aabb, boxes: &[Aabb], points: &[DVec3], seed: u6
 
 fn ask_mesh<S: Structure + 'static, V: Real + Into<R>, R: Real>(
     mesh: &TriangleMesh<V>,
+    params: &S::Params,
     inside: Option<DVec3>,
     seed: u64,
 ) -> Tally {
     let start = Instant::now();
     let mut tally = Tally::default();
-    let Ok(scene) = Aggregate::<S, _>::build(mesh.clone(), &S::Params::default()) else { return tally };
+    let Ok(scene) = Aggregate::<S, _>::build(mesh.clone(), params) else { return Tally::unbuilt() };
     let corners: Vec<Corners> = (0..mesh.triangles().len() as u32)
         .map(|prim| mesh.triangle(prim).corners.map(|c| c.to_array()))
         .collect();
@@ -360,10 +369,10 @@ impl Around {
     }
 }
 
-fn ask_spheres<S: Structure + 'static, R: Real>(balls: &[Sphere], seed: u64) -> Tally {
+fn ask_spheres<S: Structure + 'static, R: Real>(balls: &[Sphere], params: &S::Params, seed: u64) -> Tally {
     let start = Instant::now();
     let mut tally = Tally::default();
-    let Ok(scene) = Aggregate::<S, _>::build(balls.to_vec(), &S::Params::default()) else { return tally };
+    let Ok(scene) = Aggregate::<S, _>::build(balls.to_vec(), params) else { return Tally::unbuilt() };
     let list = balls.to_vec();
     let boxes: Vec<Aabb> = (0..list.len() as u32).map(|prim| list.bound(prim)).collect();
     let world = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);

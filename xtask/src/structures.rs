@@ -1,24 +1,26 @@
-//! The structures, by name: the one place where names become types.
+//! The structures, by name: the one place where names become types. Variants follow a colon.
 
-use rt_accel::Structure;
+use rt_accel::{Exhaustive, Structure};
+use rt_bvh::{Bvh, BvhParams};
+use rt_kdtree::{Clip, KdTree, KdTreeParams};
 
 /// Something to be done with a structure whose name was given.
 pub(crate) trait Job {
     /// What comes of it.
     type Out;
-    /// Does it.
-    fn run<S: Structure + 'static>(self) -> Self::Out;
+    /// Does it, with the parameters that the name stands for.
+    fn run<S: Structure + 'static>(self, params: &S::Params) -> Self::Out;
 }
 
 macro_rules! structures {
-    ($($name:literal => $structure:ty),* $(,)?) => {
+    ($($name:literal => $structure:ty: $params:expr),* $(,)?) => {
         /// All names.
         pub(crate) const NAMES: &[&str] = &[$($name),*];
 
         /// Does `job` with the structure called `name`; without such a structure, says which there are.
         pub(crate) fn with<J: Job>(name: &str, job: J) -> Result<J::Out, String> {
             match name {
-                $($name => Ok(job.run::<$structure>()),)*
+                $($name => Ok(job.run::<$structure>(&$params)),)*
                 _ => Err(format!("there is no structure {name:?}; there are {}", NAMES.join(", "))),
             }
         }
@@ -26,6 +28,8 @@ macro_rules! structures {
 }
 
 structures! {
-    "bvh" => rt_bvh::Bvh,
-    "exhaustive" => rt_accel::Exhaustive,
+    "bvh" => Bvh: BvhParams::default(),
+    "kdtree" => KdTree: KdTreeParams::default(),
+    "kdtree:box" => KdTree: KdTreeParams { clip: Clip::Box, ..KdTreeParams::default() },
+    "exhaustive" => Exhaustive: (),
 }
