@@ -34,6 +34,7 @@
 //! [`Uv`] is `f32` for rays of either precision: it orders nothing and decides nothing, and [`Surface`] is computed afresh in
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.
 
+mod bezier;
 mod mesh;
 mod polygon;
 mod refine;
@@ -41,6 +42,7 @@ mod sphere;
 mod surface;
 mod triangle;
 
+pub use bezier::{BezierPatch, PatchCounts, PatchError, PatchRoot, Tessellation};
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
 pub use refine::{Lazy, Refine};
