@@ -174,21 +174,26 @@ impl BezierPatch {
             roots.push(root);
             Next::On
         });
-        roots.sort_by(|a, b| a.t.total_cmp(&b.t));
-        // Of those that cannot be told apart, the surest stands for all.
-        let mut apart: Vec<(PatchRoot, f64)> = Vec::with_capacity(roots.len());
+        roots.sort_by(|a, b| (a.t - a.error).total_cmp(&(b.t - b.error)));
+        // Of those that cannot be told apart, the surest stands for all, with the stretch of all for its error.
+        let mut apart: Vec<(PatchRoot, f64, f64)> = Vec::with_capacity(roots.len());
         for root in roots {
+            let (start, end) = (root.t - root.error, root.t + root.error);
             match apart.last_mut() {
-                Some((last, end)) if root.t - root.error <= *end => {
-                    *end = end.max(root.t + root.error);
+                Some((last, first, until)) if start <= *until => {
+                    (*first, *until) = (start.min(*first), end.max(*until));
                     if root.error < last.error {
                         *last = root;
                     }
                 }
-                _ => apart.push((root, root.t + root.error)),
+                _ => apart.push((root, start, end)),
             }
         }
-        apart.into_iter().map(|(root, _)| root).filter(|root| ray.contains(root.t)).collect()
+        let stretch = |(root, start, end): (PatchRoot, f64, f64)| PatchRoot {
+            error: (root.t - start).max(end - root.t),
+            ..root
+        };
+        apart.into_iter().map(stretch).filter(|root| ray.contains(root.t)).collect()
     }
 
     #[inline]

@@ -186,12 +186,12 @@ impl<'a, F: FnMut(PatchRoot) -> Next> Search<'a, F> {
     fn walk(&mut self, mut piece: Piece) -> ControlFlow<()> {
         loop {
             self.counts.pieces += 1;
+            self.left = self.left.saturating_sub(1);
             let spans = piece.spans();
             let in_reach = spans.z.hi + piece.slack_z >= self.lo && spans.z.lo - piece.slack_z <= self.hi;
             if !(in_reach && spans.x.has_zero(piece.slack) && spans.y.has_zero(piece.slack)) {
                 return ControlFlow::Continue(());
             }
-            self.left = self.left.saturating_sub(1);
             let point = 16.0 * piece.slack;
             let small = piece.u.len() <= LEAST && piece.v.len() <= LEAST;
             if small || spans.x.len() <= point && spans.y.len() <= point || self.left == 0 {
@@ -271,9 +271,8 @@ impl<'a, F: FnMut(PatchRoot) -> Next> Search<'a, F> {
     fn accept(&mut self, piece: &Piece, spans: &Spans) -> ControlFlow<()> {
         if self.left == 0 {
             self.counts.unresolved += 1;
-        }
-        // A root at the border of the patch, or of pieces.
-        if let Some(root) = self.newton(piece.u, piece.v) {
+        } else if let Some(root) = self.newton(piece.u, piece.v) {
+            // A root at the border of the patch, or of pieces.
             return self.found(root);
         }
         let stretch = spans.z.len() + piece.slack_z;

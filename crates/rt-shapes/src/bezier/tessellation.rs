@@ -61,7 +61,7 @@ impl Refine for Tessellation {
             return Err(BuildError::BadParam { name: "segments", why: "must be at least 1" });
         }
         let rows = u64::from(n) + 1;
-        let (cells, corners) = (u64::from(n) * u64::from(n), rows * rows);
+        let (cells, corners) = (u64::from(n) * u64::from(n), rows.saturating_mul(rows));
         let all = |each: u64| each.saturating_mul(self.patches.len() as u64);
         let max = u32::MAX as usize - 2;
         if all(cells.saturating_mul(2)).max(all(corners)) > max as u64 {
