@@ -40,6 +40,7 @@ mod polygon;
 mod refine;
 mod sphere;
 mod surface;
+mod terrain;
 mod triangle;
 
 pub use bezier::{BezierPatch, PatchCounts, PatchError, PatchRoot, Tessellation};
@@ -48,4 +49,5 @@ pub use polygon::{Polygon, PolygonError};
 pub use refine::{Lazy, Refine};
 pub use sphere::{Sphere, SphereError};
 pub use surface::{Partials, Shape, Surface, Surfaced, Uv};
+pub use terrain::{Fractal, Heights, Samples, Terrain, TerrainParams};
 pub use triangle::{Meeting, Triangle, moller_trumbore};

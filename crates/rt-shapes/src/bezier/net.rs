@@ -13,6 +13,9 @@ pub(super) struct Span {
     pub(super) hi: f64,
 }
 
+/// The span of nothing.
+const EMPTY: Span = Span { lo: f64::INFINITY, hi: f64::NEG_INFINITY };
+
 impl Span {
     #[inline(always)]
     fn of(grid: &Grid) -> Span {
@@ -114,17 +117,14 @@ impl Piece {
     pub(super) fn contract(&self, spans: &Spans) -> Option<Rest> {
         let ([xu, xv], [yu, yv]) = (slopes(&self.x), slopes(&self.y));
         let det = xu * yv - xv * yu;
-        // Any inverse is right; a bad one only is of no use.
-        if !(det.abs() > 1e-7 * (xu.abs() + yu.abs()) * (xv.abs() + yv.abs())) {
-            return None;
-        }
         let r = 1.0 / det;
         let first = self.fixed([yv * r, -xv * r], spans);
         let second = self.fixed([-yu * r, xu * r], spans);
-        let (mut u, mut v) = (
-            Span { lo: f64::INFINITY, hi: f64::NEG_INFINITY },
-            Span { lo: f64::INFINITY, hi: f64::NEG_INFINITY },
-        );
+        // Any inverse is right, but where rounding is as much as the piece, it is of no use. False for NaN.
+        if !(first.1 < 0.25 && second.1 < 0.25) {
+            return None;
+        }
+        let (mut u, mut v) = (EMPTY, EMPTY);
         for i in 0..4 {
             for j in 0..4 {
                 let (a, b) = (THIRDS[i] - first.0[4 * i + j], THIRDS[j] - second.0[4 * i + j]);
@@ -132,11 +132,28 @@ impl Piece {
                 v = Span { lo: v.lo.min(b), hi: v.hi.max(b) };
             }
         }
-        let (u, v) = (widened(u, first.1), widened(v, second.1));
+        // And what rounding moves the ends of a cut.
+        // Values that are all on one side of zero have no root either.
+        let clear = |(grid, error): &(Grid, f64)| !Span::of(grid).has_zero(*error);
+        if clear(&first) || clear(&second) {
+            return Some(Rest { u: EMPTY, v: EMPTY, one: false });
+        }
+        let (u, v) = (widened(u, first.1 + 16.0 * U), widened(v, second.1 + 16.0 * U));
         let inside = u.lo > 0.0 && u.hi < 1.0 && v.lo > 0.0 && v.hi < 1.0;
         let one = inside && contracts(&first.0, Along::U) && contracts(&second.0, Along::V);
         let clip = |s: Span| Span { lo: s.lo.max(0.0), hi: s.hi.min(1.0) };
         Some(Rest { u: clip(u), v: clip(v), one })
+    }
+
+    /// Whether the piece, which is almost a line as the ray sees it, lies beside the ray: to one side of a line along it.
+    pub(super) fn beside(&self, spans: &Spans) -> bool {
+        let ([xu, xv], [yu, yv]) = (slopes(&self.x), slopes(&self.y));
+        let (dx, dy) = if xu.abs() + yu.abs() >= xv.abs() + yv.abs() { (xu, yu) } else { (xv, yv) };
+        let size = dx.abs() + dy.abs();
+        let (across, error) = self.fixed([-dy / size, dx / size], spans);
+        let across = Span::of(&across);
+        // False for NaN.
+        across.lo > error || across.hi < -error
     }
 
     /// A linear combination of `x` and `y`, and what it may be off by.
@@ -146,7 +163,7 @@ impl Piece {
         for k in 0..16 {
             grid[k] = a * self.x[k] + b * self.y[k];
         }
-        let rounding = (a.abs() * spans.x.size() + b.abs() * spans.y.size()) * (4.0 * U) + 16.0 * U;
+        let rounding = (a.abs() * spans.x.size() + b.abs() * spans.y.size()) * (4.0 * U);
         (grid, (a.abs() + b.abs()) * self.slack + rounding)
     }
 

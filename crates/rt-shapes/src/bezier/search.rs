@@ -212,11 +212,14 @@ impl<'a, F: FnMut(PatchRoot) -> Next> Search<'a, F> {
                     piece = piece.cut(&rest, &spans);
                     continue;
                 }
+            } else if piece.beside(&spans) {
+                return ControlFlow::Continue(());
             }
-            let along = match (piece.u.len() <= LEAST, piece.v.len() <= LEAST) {
-                (true, _) => Along::V,
-                (_, true) => Along::U,
-                _ => piece.longer(),
+            // One direction may go far below the least, where an edge is a point: but not below what numbers can tell apart.
+            let along = match piece.longer() {
+                Along::U if piece.u.len() <= 4.0 * U => Along::V,
+                Along::V if piece.v.len() <= 4.0 * U => Along::U,
+                along => along,
             };
             self.counts.splits += 1;
             let [a, b] = piece.halves(along, &spans);
