@@ -132,11 +132,11 @@ impl BezierPatch {
     fn normal_of(&self, at: &Jet, u: f64, v: f64) -> DVec3 {
         let unit = |n: DVec3| (n / n.abs().max_element()).normalize_or_zero();
         let size = |d: DVec3| d.abs().max_element();
-        let flat = |n: DVec3, d: DVec3, e: DVec3| !(size(n) > 1e-12 * size(d) * size(e));
+        let steep = |n: DVec3, d: DVec3, e: DVec3| size(n) > 1e-12 * size(d) * size(e);
         // Derivatives as small as rounding have no direction.
         let noise = self.size * gamma(64);
         let n = at.du.cross(at.dv);
-        if size(at.du) > noise && size(at.dv) > noise && !flat(n, at.du, at.dv) {
+        if size(at.du) > noise && size(at.dv) > noise && steep(n, at.du, at.dv) {
             return unit(n);
         }
         // Towards the middle the first derivatives change by the second ones.
@@ -380,7 +380,7 @@ impl<R: Real> Shape<R> for BezierPatch {
 pub(crate) fn weingarten(du: DVec3, dv: DVec3, [duu, duv, dvv]: [DVec3; 3], n: DVec3) -> (DVec3, DVec3) {
     let (e, f, g) = (du.dot(du), du.dot(dv), dv.dot(dv));
     let det = e * g - f * f;
-    if !(det > 1e-24 * e * g) {
+    if det <= 1e-24 * e * g || det.is_nan() {
         return (DVec3::ZERO, DVec3::ZERO);
     }
     let (l, m, k) = (n.dot(duu), n.dot(duv), n.dot(dvv));

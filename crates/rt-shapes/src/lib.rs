@@ -35,6 +35,7 @@
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.
 
 mod bezier;
+mod julia;
 mod mesh;
 mod polygon;
 mod refine;
@@ -44,6 +45,7 @@ mod terrain;
 mod triangle;
 
 pub use bezier::{BezierPatch, PatchCounts, PatchError, PatchRoot, Tessellation};
+pub use julia::{Julia, JuliaCounts, JuliaParams, Traced};
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
 pub use refine::{Lazy, Refine};

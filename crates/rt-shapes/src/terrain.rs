@@ -99,7 +99,7 @@ impl<H: Heights> Terrain<H> {
         if !(min.is_finite() && ((min.abs() + size) * (4.0 * f64::EPSILON)).cmplt(step).all()) {
             return bad("min", "is so far away that steps vanish");
         }
-        if !(tolerance >= 0.0) {
+        if tolerance < 0.0 || tolerance.is_nan() {
             return bad("tolerance", "must not be negative");
         }
         heights.check(level)?;

@@ -310,7 +310,7 @@ impl<'a, F: FnMut(PatchRoot) -> Next> Search<'a, F> {
             self.counts.newton += 1;
             let Local { f, du, dv } = self.local(u, v);
             let off = f[0] * f[0] + f[1] * f[1];
-            if !(off < least) {
+            if off >= least || off.is_nan() {
                 break;
             }
             (best, least) = ((u, v), off);
