@@ -1,9 +1,11 @@
 //! [`BezierPatch`]: bicubic patches, met directly.
 
+mod bilinear;
 mod net;
 mod search;
 mod tessellation;
 
+pub use bilinear::BilinearPatch;
 pub use search::{PatchCounts, PatchRoot};
 pub use tessellation::Tessellation;
 
@@ -174,26 +176,7 @@ impl BezierPatch {
             roots.push(root);
             Next::On
         });
-        roots.sort_by(|a, b| (a.t - a.error).total_cmp(&(b.t - b.error)));
-        // Of those that cannot be told apart, the surest stands for all, with the stretch of all for its error.
-        let mut apart: Vec<(PatchRoot, f64, f64)> = Vec::with_capacity(roots.len());
-        for root in roots {
-            let (start, end) = (root.t - root.error, root.t + root.error);
-            match apart.last_mut() {
-                Some((last, first, until)) if start <= *until => {
-                    (*first, *until) = (start.min(*first), end.max(*until));
-                    if root.error < last.error {
-                        *last = root;
-                    }
-                }
-                _ => apart.push((root, start, end)),
-            }
-        }
-        let stretch = |(root, start, end): (PatchRoot, f64, f64)| PatchRoot {
-            error: (root.t - start).max(end - root.t),
-            ..root
-        };
-        apart.into_iter().map(stretch).filter(|root| ray.contains(root.t)).collect()
+        apart(roots, ray)
     }
 
     #[inline]
@@ -300,6 +283,30 @@ const GAUSS: [(f64, f64); 8] = [
     (0.960_289_856_497_536_23, 0.101_228_536_290_376_26),
 ];
 
+/// Roots in the ray's interval, nearest first, those that cannot be told apart as one.
+fn apart(mut roots: Vec<PatchRoot>, ray: &Ray<f64>) -> Vec<PatchRoot> {
+    roots.sort_by(|a, b| (a.t - a.error).total_cmp(&(b.t - b.error)));
+    // Of those that cannot be told apart, the surest stands for all, with the stretch of all for its error.
+    let mut apart: Vec<(PatchRoot, f64, f64)> = Vec::with_capacity(roots.len());
+    for root in roots {
+        let (start, end) = (root.t - root.error, root.t + root.error);
+        match apart.last_mut() {
+            Some((last, first, until)) if start <= *until => {
+                (*first, *until) = (start.min(*first), end.max(*until));
+                if root.error < last.error {
+                    *last = root;
+                }
+            }
+            _ => apart.push((root, start, end)),
+        }
+    }
+    let stretch = |(root, start, end): (PatchRoot, f64, f64)| PatchRoot {
+        error: (root.t - start).max(end - root.t),
+        ..root
+    };
+    apart.into_iter().map(stretch).filter(|root| ray.contains(root.t)).collect()
+}
+
 /// The ray in `f64`, reaching as far as numbers that round to its end.
 fn reaching<R: Real>(ray: &Ray<R>) -> Ray<f64> {
     Ray { t_max: ray.t_max.reach(), ..ray.widen() }
@@ -359,8 +366,8 @@ impl<R: Real> Shape<R> for BezierPatch {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
         let (u, v) = self.parameters(ray, hit);
         let jet = self.jet(u, v);
-        // Twice three steps of three roundings.
-        let error = self.control.iter().fold(DVec3::ZERO, |m, p| m.max(p.abs())) * gamma(20);
+        // Twice three steps of three roundings, and four more where the control points themselves were computed.
+        let error = self.control.iter().fold(DVec3::ZERO, |m, p| m.max(p.abs())) * gamma(28);
         let normal = self.normal_of(&jet, u, v);
         let normal = if normal == DVec3::ZERO { -ray.widen().dir.normalize_or(DVec3::Z) } else { normal };
         Surface { point: jet.p, error, normal, shading: normal, uv: DVec2::new(u, v) }

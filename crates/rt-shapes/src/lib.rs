@@ -44,7 +44,7 @@ mod surface;
 mod terrain;
 mod triangle;
 
-pub use bezier::{BezierPatch, PatchCounts, PatchError, PatchRoot, Tessellation};
+pub use bezier::{BezierPatch, BilinearPatch, PatchCounts, PatchError, PatchRoot, Tessellation};
 pub use julia::{Julia, JuliaCounts, JuliaParams, Traced};
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};

@@ -1,5 +1,8 @@
 //! Bicubic patches against an oracle that cuts them to the last digit, and the teapot against what is known of it.
 
+// The long test, run by hand, says what it found.
+#![allow(clippy::print_stdout)]
+
 use core::ops::ControlFlow;
 use rt_accel::{Aggregate, Exhaustive, Primitive, WorldBound};
 use rt_bounds::Aabb;

@@ -1,5 +1,8 @@
 //! Terrains against the explicit meshes of the same level.
 
+// The long test, run by hand, says what it found.
+#![allow(clippy::print_stdout)]
+
 use core::ops::ControlFlow;
 use rt_accel::{Aggregate, Counts, Exhaustive, Hit, Primitive, WorldBound};
 use rt_geom::glam::{DVec2, DVec3};

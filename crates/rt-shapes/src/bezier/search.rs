@@ -155,12 +155,21 @@ pub(super) struct Search<'a, F> {
 impl<'a> Search<'a, fn(PatchRoot) -> Next> {
     /// Parameters of a root near rough ones, in full precision, where Newton finds them.
     pub(super) fn refine(frame: &'a Frame, whole: &'a Piece, (u, v): (f64, f64)) -> Option<(f64, f64)> {
+        Search::near(frame, whole, (u, v), &mut PatchCounts::default()).map(|root| (root.u, root.v))
+    }
+
+    /// The root near rough parameters, where Newton finds it.
+    pub(super) fn near(
+        frame: &'a Frame,
+        whole: &'a Piece,
+        (u, v): (f64, f64),
+        counts: &'a mut PatchCounts,
+    ) -> Option<PatchRoot> {
         let each: fn(PatchRoot) -> Next = |_| Next::On;
-        let counts = &mut PatchCounts::default();
         let mut search = Search { frame, whole, lo: 0.0, hi: 0.0, left: 0, counts, each };
         // As far as f32 may have moved them.
         let around = |x: f64| Span { lo: x - 1e-7, hi: x + 1e-7 };
-        search.newton(around(u), around(v)).map(|(_, root)| (root.u, root.v))
+        search.newton(around(u), around(v)).map(|(_, root)| root)
     }
 }
 
