@@ -55,8 +55,14 @@
 
 mod contest;
 mod fast;
+#[allow(dead_code)] // Not asked yet.
+mod fractals;
 mod judge;
 mod knobs;
+#[allow(dead_code)] // Not asked yet.
+mod lazy;
+#[allow(dead_code)] // Not asked yet.
+mod patches;
 mod queries;
 #[cfg(feature = "rivals")]
 mod rivals;

@@ -6,6 +6,9 @@
 //! * Triangles are closed sets: an edge or vertex met exactly is met, by each neighbour. When crossings are counted
 //!   (`all_hits`), it belongs to one of them.
 //! * Triangles without area are never hit, nor are rays in a triangle's own plane.
+//! * Patches are met directly: [`BilinearPatch`], and [`BezierPatch`] without a lost root; terrains ([`Terrain`]) and Julia sets
+//!   ([`Julia`]) exist only where rays come near. What must be turned into triangles first ([`Refine`]) can be so when the first
+//!   ray reaches it ([`Lazy`]).
 //! * A hit is its distance and a [`Uv`]; the full [`Surface`] record is asked of the winner only.
 //!
 //! ```
@@ -29,20 +32,28 @@
 //!
 //! This crate knows no structure. The `t` of a triangle is the exact distance, correctly rounded to the ray's precision, whatever
 //! the condition of the problem; so neighbours that are met at a shared vertex are met at one `t`. That of a sphere is within
-//! `2^-33` of half a unit in the last place.
+//! `2^-33` of half a unit in the last place. Those of patches say what they are off by ([`PatchRoot`]).
 //!
 //! [`Uv`] is `f32` for rays of either precision: it orders nothing and decides nothing, and [`Surface`] is computed afresh in
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.
 
+mod bezier;
 mod clip;
+mod julia;
 mod mesh;
 mod polygon;
+mod refine;
 mod sphere;
 mod surface;
+mod terrain;
 mod triangle;
 
+pub use bezier::{BezierPatch, BilinearPatch, PatchCounts, PatchError, PatchRoot, Tessellation};
+pub use julia::{Julia, JuliaCounts, JuliaParams, Traced};
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
+pub use refine::{Lazy, Refine};
 pub use sphere::{Sphere, SphereError};
 pub use surface::{Partials, Shape, Surface, Surfaced, Uv};
+pub use terrain::{Fractal, Heights, Samples, Terrain, TerrainParams};
 pub use triangle::{Meeting, Triangle, moller_trumbore};
