@@ -34,12 +34,16 @@
 //! [`Uv`] is `f32` for rays of either precision: it orders nothing and decides nothing, and [`Surface`] is computed afresh in
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.
 
+mod loop_subdivision;
 mod mesh;
 mod polygon;
 mod sphere;
 mod surface;
 mod triangle;
 
+pub use loop_subdivision::{
+    Boundaries, Corners, Deviation, LimitPoint, LoopError, LoopRules, LoopSurface, Vertices, Weights,
+};
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
 pub use sphere::{Sphere, SphereError};
