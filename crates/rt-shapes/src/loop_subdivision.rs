@@ -312,7 +312,7 @@ impl LoopSurface {
     pub fn limit(&self, face: u32, u: f64, v: f64) -> Option<LimitPoint> {
         let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
         (inside && (face as usize) < self.face_count()).then(|| {
-            let w = (1.0 - u) - v;
+            let w = ((1.0 - u) - v).max(0.0);
             self.net.limit_at(face, [w, u, v])
         })
     }

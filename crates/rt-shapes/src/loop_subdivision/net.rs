@@ -253,7 +253,8 @@ impl Net {
             if fan.len() < faces[vertex as usize] as usize {
                 let leaving = (0..self.corners.len() as u32).filter(|&h| self.corners[h as usize] == vertex);
                 let other = leaving.into_iter().find(|h| !fan.contains(h)).unwrap_or(start);
-                return Err(LoopError::SplitVertex { vertex, faces: [start / 3, other / 3] });
+                let (one, other) = (start / 3, other / 3);
+                return Err(LoopError::SplitVertex { vertex, faces: [one.min(other), one.max(other)] });
             }
         }
         Ok(())

@@ -99,30 +99,39 @@ impl Net {
     /// The limit at a point of face 0 of a patch.
     pub(super) fn evaluate(&self, weights: [f64; 3]) -> LimitPoint {
         if let Some(regular) = self.regular() {
-            return local(&regular, weights, DVec3::ZERO, [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]]);
+            return local(&regular, weights, (DVec3::ZERO, 1.0), [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]]);
         }
         let mut net = self.clone();
         let mut w = weights;
-        // How the weights move with u and v; and where the net's own origin is.
+        // Where the net's own origin is, in what unit it is kept, and how the weights move with u and v, times that unit.
+        let (mut origin, mut unit) = (DVec3::ZERO, 1.0);
         let mut moves = [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]];
-        let mut origin = DVec3::ZERO;
         loop {
             if let Some(regular) = net.regular() {
-                return local(&regular, w, origin, moves);
+                return local(&regular, w, (origin, unit), moves);
             }
             if let Some(k) = (0..3).find(|&k| w[(k + 1) % 3] == 0.0 && w[(k + 2) % 3] == 0.0) {
                 let (point, normal) = net.limit(k as u32);
-                return LimitPoint { point: origin + point, dpdu: DVec3::ZERO, dpdv: DVec3::ZERO, normal };
+                return LimitPoint {
+                    point: origin + point * unit,
+                    dpdu: DVec3::ZERO,
+                    dpdv: DVec3::ZERO,
+                    normal,
+                };
             }
-            // Near a corner the net shrinks towards it: kept around the origin, it does so without losing digits.
             let near = (0..3).find(|&k| w[k] >= 0.5);
-            let here = net.points[net.corners[near.unwrap_or(0)] as usize];
-            origin += here;
-            net.shift(here);
-            let child = near.unwrap_or(3);
             w = in_child(near, w);
             moves = moves.map(|m| in_child(near, m));
-            net = net.subdivided().patch(child as u32);
+            if let Some(k) = near {
+                // The net shrinks towards the corner, by about a half a level: kept around the origin, and enlarged as much, it
+                // loses no digits.
+                let here = net.points[net.corners[k] as usize];
+                origin += here * unit;
+                unit *= 0.5;
+                net.points.iter_mut().for_each(|p| *p = (*p - here) * 2.0);
+                moves = moves.map(|m| m.map(|m| m * 0.5));
+            }
+            net = net.subdivided().patch(near.unwrap_or(3) as u32);
         }
     }
 
@@ -181,10 +190,10 @@ fn in_child(near: Option<usize>, w: [f64; 3]) -> [f64; 3] {
 }
 
 /// The box spline as a function of u and v.
-fn local(regular: &Regular, w: [f64; 3], origin: DVec3, moves: [[f64; 3]; 2]) -> LimitPoint {
+fn local(regular: &Regular, w: [f64; 3], (origin, unit): (DVec3, f64), moves: [[f64; 3]; 2]) -> LimitPoint {
     let (point, slopes) = regular.at(w);
     let [dpdu, dpdv] = moves.map(|m| slopes[0] * m[0] + slopes[1] * m[1] + slopes[2] * m[2]);
-    LimitPoint { point: origin + point, dpdu, dpdv, normal: unit_cross(dpdu, dpdv) }
+    LimitPoint { point: origin + point * unit, dpdu, dpdv, normal: unit_cross(dpdu, dpdv) }
 }
 
 #[cfg(test)]
@@ -196,7 +205,8 @@ mod tests {
         let ones = [DVec3::ONE; 3];
         let flat = Regular { corners: ones, outer: [[DVec3::ONE; 2]; 3], beyond: ones };
         for (u, v) in [(0.0, 0.0), (0.25, 0.5), (0.1, 0.05), (0.0, 1.0)] {
-            let at = local(&flat, [1.0 - u - v, u, v], DVec3::ZERO, [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]]);
+            let at =
+                local(&flat, [1.0 - u - v, u, v], (DVec3::ZERO, 1.0), [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]]);
             assert!((at.point - DVec3::ONE).length() < 1e-15);
             assert!(at.dpdu.length() + at.dpdv.length() < 1e-14);
         }
