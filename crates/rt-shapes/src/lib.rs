@@ -44,7 +44,7 @@ mod triangle;
 pub use loop_subdivision::{
     Boundaries, Corners, Deviation, LimitPoint, LoopError, LoopRules, LoopSurface, Vertices, Weights,
 };
-pub use mesh::{MeshError, TriangleMesh};
+pub use mesh::{AreaSample, Component, Facing, MeshError, MeshSampler, Orientation, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
 pub use sphere::{Sphere, SphereError};
 pub use surface::{Partials, Shape, Surface, Surfaced, Uv};

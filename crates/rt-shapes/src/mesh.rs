@@ -1,5 +1,11 @@
 //! [`TriangleMesh`]: indexed triangles.
 
+mod area;
+mod orientation;
+
+pub use area::{AreaSample, MeshSampler};
+pub use orientation::{Component, Facing, Orientation};
+
 use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
@@ -142,15 +148,6 @@ impl<V: Real> TriangleMesh<V> {
         Some(Triangle { corners: corners.map(|i| widen(self.vertices[i as usize])) })
     }
 
-    /// How many triangles have no area: equal or collinear corners, decided in `f64`.
-    pub fn degenerate(&self) -> usize {
-        let flat = |prim: &u32| {
-            let [a, b, c] = self.triangle(*prim).corners;
-            (b - a).cross(c - a) == DVec3::ZERO
-        };
-        (0..self.triangles.len() as u32).filter(flat).count()
-    }
-
     /// The interpolated normal, if there is one with a direction.
     fn shading(&self, prim: u32, weights: [f64; 3]) -> Option<DVec3> {
         let [a, b, c] = self.normals_of(prim)?;
@@ -165,6 +162,24 @@ impl<V: Real> TriangleMesh<V> {
     fn uvs_of(&self, prim: u32) -> Option<[DVec2; 3]> {
         let of = |i: u32| DVec2::from(self.uvs[i as usize].map(f64::from));
         (!self.uvs.is_empty()).then(|| self.triangles[prim as usize].map(of))
+    }
+
+    /// The surface of a triangle at the point with these weights of its corners.
+    fn surface_at(&self, prim: u32, weights: [f64; 3]) -> Surface {
+        let [w, u, v] = weights;
+        let mut surface = self.triangle(prim).surface(weights);
+        surface.uv = match self.uvs_of(prim) {
+            Some([a, b, c]) => a * w + b * u + c * v,
+            None => DVec2::new(u, v),
+        };
+        if let Some(shading) = self.shading(prim, weights) {
+            // The vertex normals decide which side is outside.
+            if shading.dot(surface.normal) < 0.0 {
+                surface.normal = -surface.normal;
+            }
+            surface.shading = shading;
+        }
+        surface
     }
 
     /// The weights of the corners at a hit, in full precision.
@@ -231,22 +246,7 @@ pub(crate) fn hit<R: Real>(prim: u32, Meeting { t, u, v }: Meeting<R>) -> Hit<Uv
 
 impl<R: Real, V: Real + Into<R>> Surfaced<R> for TriangleMesh<V> {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
-        let prim = hit.at.prim;
-        let [w, u, v] = self.weights(ray, hit);
-        let weights = [w, u, v];
-        let mut surface = self.triangle(prim).surface(weights);
-        surface.uv = match self.uvs_of(prim) {
-            Some([a, b, c]) => a * w + b * u + c * v,
-            None => DVec2::new(u, v),
-        };
-        if let Some(shading) = self.shading(prim, weights) {
-            // The vertex normals decide which side is outside.
-            if shading.dot(surface.normal) < 0.0 {
-                surface.normal = -surface.normal;
-            }
-            surface.shading = shading;
-        }
-        surface
+        self.surface_at(hit.at.prim, self.weights(ray, hit))
     }
 
     /// Along the mesh's own texture coordinates where it has such and they are not degenerate on this triangle, else along two
