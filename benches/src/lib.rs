@@ -59,6 +59,9 @@ mod knobs;
 mod queries;
 #[cfg(feature = "rivals")]
 mod rivals;
+// Its question is not asked yet.
+#[cfg_attr(not(test), expect(dead_code))]
+mod shapes;
 mod slab;
 mod subject;
 

@@ -24,31 +24,39 @@ pub struct Deviation {
 }
 
 impl LoopSurface {
-    /// Measures the tessellation of level `level` in `fineness^2` points of each triangle, evenly spread and none on an edge.
+    /// Measures the tessellation of level `level` in `fineness^2` points of each triangle, evenly spread and none on an edge; the
+    /// largest distance also at its corners.
     ///
     /// The distance goes from a point of the limit surface to the nearest point of the triangle whose parameters it shares; the
     /// nearest point of the whole tessellation may be nearer.
     ///
-    /// Cost: about a microsecond a triangle and another a point, more beside extraordinary vertices.
+    /// Pushing vertices to the limit brings the largest distance down by about a third, but not the mean: with limit vertices all
+    /// of a convex surface is on one side of its triangles, with control vertices parts are on either.
+    ///
+    /// Cost: two or three microseconds a point, more beside extraordinary vertices.
     ///
     /// # Errors
     ///
     /// As [`LoopSurface::refine`].
     pub fn deviation(&self, level: u32, vertices: Vertices, fineness: u32) -> Result<Deviation, LoopError> {
         let net = self.net_at(level)?;
-        let corners: Vec<DVec3> = match vertices {
-            Vertices::Control => net.points.clone(),
-            Vertices::Limit => net.starts().iter().map(|&start| net.limit(start).0).collect(),
+        let limits: Vec<DVec3> = net.starts().iter().map(|&start| net.limit(start).0).collect();
+        let corners = match vertices {
+            Vertices::Control => &net.points,
+            Vertices::Limit => &limits,
         };
         let fineness = fineness.max(1);
         let (mut largest, mut squares, mut area) = (0.0f64, 0.0, 0.0);
         for (face, triangle) in (0..).zip(net.corners.chunks_exact(3)) {
             let patch = net.patch(face);
             let [a, b, c] = [0, 1, 2].map(|k| corners[triangle[k] as usize]);
+            let off = |p: DVec3| (p - nearest(p, [a, b, c])).length_squared();
+            for &v in triangle {
+                largest = largest.max(off(limits[v as usize]));
+            }
             let weight = (b - a).cross(c - a).length() / (fineness * fineness) as f64;
             for [u, v] in centres(fineness) {
-                let point = patch.evaluate([1.0 - u - v, u, v]).point;
-                let off = (point - nearest(point, [a, b, c])).length_squared();
+                let off = off(patch.evaluate([1.0 - u - v, u, v]).point);
                 largest = largest.max(off);
                 squares += off * weight;
                 area += weight;
