@@ -34,18 +34,23 @@
 //! [`Uv`] is `f32` for rays of either precision: it orders nothing and decides nothing, and [`Surface`] is computed afresh in
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.
 
+mod bezier;
 mod loop_subdivision;
 mod mesh;
 mod polygon;
+mod refine;
 mod sphere;
 mod surface;
 mod triangle;
 
+pub use bezier::{BezierPatch, PatchCounts, PatchError, PatchRoot, Tessellation};
 pub use loop_subdivision::{
-    Boundaries, Corners, Deviation, LimitPoint, LoopError, LoopRules, LoopSurface, Vertices, Weights,
+    Boundaries, Corners, Deviation, LimitPoint, LoopError, LoopRules, LoopSurface, LoopTessellation,
+    Vertices, Weights,
 };
 pub use mesh::{AreaSample, Component, Facing, MeshError, MeshSampler, Orientation, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
+pub use refine::{Lazy, Refine};
 pub use sphere::{Sphere, SphereError};
 pub use surface::{Partials, Shape, Surface, Surfaced, Uv};
 pub use triangle::{Meeting, Triangle, moller_trumbore};

@@ -8,12 +8,13 @@ mod step;
 
 pub use deviation::{Deviation, Vertices};
 
-use crate::TriangleMesh;
+use crate::{Refine, TriangleMesh};
 use core::fmt;
 use net::{Net, Ring};
+use rt_accel::{BuildError, WorldBound};
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
-use rt_geom::{Real, gamma};
+use rt_geom::{Real, f32_above, f32_below, gamma};
 
 /// Coordinates beyond this are refused: sums and products of them would overflow.
 const LARGEST: f64 = 1e70;
@@ -298,13 +299,13 @@ impl LoopSurface {
 
     /// A box around the limit surface and all its refinements.
     pub fn world_bound(&self) -> Aabb {
-        enclose(&self.net)
+        enclose(&self.net, DVec3::ZERO)
     }
 
     /// A box around the part of the limit surface that belongs to triangle `face` of the control net: the box of the triangle
     /// and of its neighbours. `None` if there is no such triangle.
     pub fn face_bound(&self, face: u32) -> Option<Aabb> {
-        ((face as usize) < self.face_count()).then(|| enclose(&self.net.patch(face)))
+        ((face as usize) < self.face_count()).then(|| enclose(&self.net.patch(face), DVec3::ZERO))
     }
 
     /// The limit surface over triangle `face` of the control net, where `u` and `v` weigh its second and third corner. `None` if
@@ -432,13 +433,57 @@ fn narrow<V: Real>(p: DVec3) -> [V; 3] {
 }
 
 /// A box around the points and all their means, however these were rounded: each level adds less than eight roundings, and there
-/// is no memory for 32 levels.
-fn enclose(net: &Net) -> Aabb {
+/// is no memory for 32 levels. Rounded outward to `f32`, whose points around it stay inside when they are rounded, before it is moved.
+fn enclose(net: &Net, origin: DVec3) -> Aabb {
     if net.points.is_empty() {
         return Aabb::EMPTY;
     }
     let (min, max) =
         net.points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
     let slack = min.abs().max(max.abs()) * gamma(256);
-    Aabb::from_f64(min - slack, max + slack, DVec3::ZERO)
+    let outward = |p: DVec3, round: fn(f64) -> f32| DVec3::from_array(p.to_array().map(|x| round(x).into()));
+    Aabb::from_f64(outward(min - slack, f32_below), outward(max + slack, f32_above), origin)
+}
+
+/// A Loop surface as the `f32` mesh of one of its levels: what [`Lazy`](crate::Lazy) refines when a ray comes near.
+///
+/// ```
+/// use rt_accel::{Exhaustive, Primitive};
+/// use rt_geom::{Ray, glam::Vec3A};
+/// use rt_shapes::{Lazy, LoopSurface, LoopTessellation};
+/// let flap = LoopSurface::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])?;
+/// let lazy = Lazy::<Exhaustive, _>::new(LoopTessellation { surface: flap, level: 2 }, ());
+/// assert_eq!(lazy.intersect(&Ray::new(Vec3A::new(0.3, 0.3, -2.0), Vec3A::Z)).unwrap().t, 2.0);
+/// # Ok::<(), rt_shapes::LoopError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct LoopTessellation {
+    /// The surface.
+    pub surface: LoopSurface,
+    /// How often each triangle is cut into four.
+    pub level: u32,
+}
+
+impl WorldBound for LoopTessellation {
+    fn world_bound(&self) -> Aabb {
+        self.surface.world_bound()
+    }
+    fn world_bound_from(&self, origin: DVec3) -> Aabb {
+        enclose(&self.surface.net, origin)
+    }
+}
+
+impl Refine for LoopTessellation {
+    type Parts = TriangleMesh;
+
+    /// As [`LoopSurface::refine`].
+    fn refine(&self) -> Result<TriangleMesh, BuildError> {
+        self.surface.refine(self.level).map_err(|error| match error {
+            LoopError::OutOfMemory { needed, limit } => BuildError::OutOfMemory { needed, limit },
+            LoopError::TooManyTriangles { len } => {
+                BuildError::TooManyPrimitives { len, max: u32::MAX as usize / 3 }
+            }
+            _ => BuildError::BadParam { name: "surface", why: "it is no manifold" },
+        })
+    }
 }

@@ -264,6 +264,13 @@ mod tests {
             let line = |k: i64| (0..3).map(|i| (v[i] * k) as f64 * (2f64).powi(e[i])).collect::<Vec<f64>>();
             let all: Vec<f64> = [0, 3, 7].into_iter().flat_map(line).collect();
             prop_assert!(triangle(all.try_into().unwrap()).is_degenerate());
+            // And never hit, not even through a corner.
+            let in_line = |k: i64| DVec3::new((v[0] * k) as f64, (v[1] * k) as f64, (v[2] * k) as f64);
+            let (none, o) = (Triangle { corners: [0, 3, 7].map(in_line) }, DVec3::new(9.0, -5.0, 3.0));
+            for dir in [in_line(3) - o, in_line(5) - o, in_line(1), DVec3::X] {
+                let ray = rt_geom::Ray::new(o, dir);
+                prop_assert!(none.intersect(&ray).is_none() && none.cross(&ray).is_none());
+            }
             // Without scales: the squared area is an integer over four.
             let t = triangle(v.map(|x| (x + far as i64) as f64));
             let square: i64 = [(0, 1), (1, 2), (2, 0)].iter().map(|&(i, j)| cross(i, j).pow(2)).sum();
