@@ -18,7 +18,8 @@ pub(crate) struct Tessellation {
     pub(crate) ns_per_triangle: f64,
     /// The 90th percentile of rounds over the 10th.
     pub(crate) spread: f64,
-    /// Whether nothing of the same shape beats it in both time and rms distance.
+    /// Whether nothing of the same shape beats it in both time and largest distance. Limit vertices come
+    /// with normals, control vertices without.
     pub(crate) on_front: bool,
 }
 
@@ -61,7 +62,7 @@ pub(crate) fn ask_loop(effort: Effort, watch: Watch<'_>) -> Result<Vec<Tessellat
         let mine = &mut all[begin..];
         let total = |t: &Tessellation| t.ns_per_triangle * t.deviation.triangles as f64;
         let points: Vec<Point> =
-            mine.iter().map(|t| Point { time: total(t), error: t.deviation.rms }).collect();
+            mine.iter().map(|t| Point { time: total(t), error: t.deviation.largest }).collect();
         for i in front(&points) {
             mine[i].on_front = true;
         }
