@@ -66,6 +66,9 @@ mod patches;
 mod queries;
 #[cfg(feature = "rivals")]
 mod rivals;
+// Its question is not asked yet.
+#[cfg_attr(not(test), expect(dead_code))]
+mod shapes;
 mod slab;
 // Part of the question `volumes`.
 mod space;

@@ -320,7 +320,7 @@ impl<R: Real> Primitive<R> for Julia {
     fn intersect_counted(&self, ray: &Ray<R>, counts: &mut Counts) -> Option<Hit<Uv, R>> {
         let mut work = JuliaCounts::default();
         let hit = Julia::at(ray, self.trace(&ray.widen(), &mut work));
-        *counts += Counts { nodes: work.steps, leaves: 0, prims: 1 };
+        *counts += Counts { nodes: work.steps, prims: 1, ..Counts::default() };
         hit
     }
 }

@@ -40,6 +40,7 @@
 mod bezier;
 mod clip;
 mod julia;
+mod loop_subdivision;
 mod mesh;
 mod polygon;
 mod refine;
@@ -50,7 +51,11 @@ mod triangle;
 
 pub use bezier::{BezierPatch, BilinearPatch, PatchCounts, PatchError, PatchRoot, Tessellation};
 pub use julia::{Julia, JuliaCounts, JuliaParams, Traced};
-pub use mesh::{MeshError, TriangleMesh};
+pub use loop_subdivision::{
+    Boundaries, Corners, Deviation, LimitPoint, LoopError, LoopRules, LoopSurface, LoopTessellation,
+    Vertices, Weights,
+};
+pub use mesh::{AreaSample, Component, Facing, MeshError, MeshSampler, Orientation, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
 pub use refine::{Lazy, Refine};
 pub use sphere::{Sphere, SphereError};

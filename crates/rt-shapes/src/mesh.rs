@@ -1,5 +1,11 @@
 //! [`TriangleMesh`]: indexed triangles.
 
+mod area;
+mod orientation;
+
+pub use area::{AreaSample, MeshSampler};
+pub use orientation::{Component, Facing, Orientation};
+
 use crate::clip::clipped_bound;
 use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};
 use core::fmt;
@@ -143,15 +149,6 @@ impl<V: Real> TriangleMesh<V> {
         Some(Triangle { corners: corners.map(|i| widen(self.vertices[i as usize])) })
     }
 
-    /// How many triangles have no area: equal or collinear corners, decided in `f64`.
-    pub fn degenerate(&self) -> usize {
-        let flat = |prim: &u32| {
-            let [a, b, c] = self.triangle(*prim).corners;
-            (b - a).cross(c - a) == DVec3::ZERO
-        };
-        (0..self.triangles.len() as u32).filter(flat).count()
-    }
-
     /// The interpolated normal, if there is one with a direction.
     fn shading(&self, prim: u32, weights: [f64; 3]) -> Option<DVec3> {
         let [a, b, c] = self.normals_of(prim)?;
@@ -166,6 +163,24 @@ impl<V: Real> TriangleMesh<V> {
     fn uvs_of(&self, prim: u32) -> Option<[DVec2; 3]> {
         let of = |i: u32| DVec2::from(self.uvs[i as usize].map(f64::from));
         (!self.uvs.is_empty()).then(|| self.triangles[prim as usize].map(of))
+    }
+
+    /// The surface of a triangle at the point with these weights of its corners.
+    fn surface_at(&self, prim: u32, weights: [f64; 3]) -> Surface {
+        let [w, u, v] = weights;
+        let mut surface = self.triangle(prim).surface(weights);
+        surface.uv = match self.uvs_of(prim) {
+            Some([a, b, c]) => a * w + b * u + c * v,
+            None => DVec2::new(u, v),
+        };
+        if let Some(shading) = self.shading(prim, weights) {
+            // The vertex normals decide which side is outside.
+            if shading.dot(surface.normal) < 0.0 {
+                surface.normal = -surface.normal;
+            }
+            surface.shading = shading;
+        }
+        surface
     }
 
     /// The weights of the corners at a hit, in full precision.
@@ -245,22 +260,7 @@ pub(crate) fn hit<R: Real>(prim: u32, Meeting { t, u, v }: Meeting<R>) -> Hit<Uv
 
 impl<R: Real, V: Real + Into<R>> Surfaced<R> for TriangleMesh<V> {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
-        let prim = hit.at.prim;
-        let [w, u, v] = self.weights(ray, hit);
-        let weights = [w, u, v];
-        let mut surface = self.triangle(prim).surface(weights);
-        surface.uv = match self.uvs_of(prim) {
-            Some([a, b, c]) => a * w + b * u + c * v,
-            None => DVec2::new(u, v),
-        };
-        if let Some(shading) = self.shading(prim, weights) {
-            // The vertex normals decide which side is outside.
-            if shading.dot(surface.normal) < 0.0 {
-                surface.normal = -surface.normal;
-            }
-            surface.shading = shading;
-        }
-        surface
+        self.surface_at(hit.at.prim, self.weights(ray, hit))
     }
 
     /// Along the mesh's own texture coordinates where it has such and they are not degenerate on this triangle, else along two
@@ -373,5 +373,79 @@ mod tests {
             }
         }
         assert!(hits > 2000);
+    }
+
+    /// One triangle, leaning, with these texture coordinates and vertex normals.
+    fn leaning(uvs: Option<[[f32; 2]; 3]>, normals: Option<[[f32; 3]; 3]>) -> TriangleMesh<f64> {
+        let corners = vec![[0.1, 0.2, 4.0], [7.3, 0.4, 5.5], [0.5, 9.6, 6.0]];
+        let mut mesh = TriangleMesh::new(corners, vec![[0, 1, 2]]).unwrap();
+        if let Some(uvs) = uvs {
+            mesh = mesh.with_uvs(uvs.to_vec()).unwrap();
+        }
+        if let Some(normals) = normals {
+            mesh = mesh.with_normals(normals.to_vec()).unwrap();
+        }
+        mesh
+    }
+
+    #[test]
+    fn partials_are_those_of_differences() {
+        let bent = [[0.1, -0.3, 1.0], [0.4, 0.2, 0.7], [-0.3, 0.5, 1.6]];
+        let inward = bent.map(|n| n.map(|x: f32| -x));
+        let plain = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let skew = [[0.3, 0.1], [2.0, -0.5], [1.0, 3.0]];
+        let mirrored = [[0.0, 0.0], [0.0, 4.0], [2.0, 0.0]];
+        let needle = [[0.0, 0.0], [1.0, 1.0], [1.0, 1.000001]];
+        for uvs in [None, Some(plain), Some(skew), Some(mirrored), Some(needle)] {
+            for normals in [None, Some(bent), Some(inward)] {
+                let mesh = leaning(uvs, normals);
+                let at = |point: DVec3| {
+                    let ray = Ray::new(DVec3::new(point.x, point.y, 0.0), DVec3::Z);
+                    let hit = Geometry::<f64>::intersect(&mesh, 0, &ray).unwrap();
+                    (mesh.surface(&ray, &hit), mesh.partials(&ray, &hit))
+                };
+                let (here, partials) = at(DVec3::new(2.2, 2.9, 0.0));
+                for (along, turn, step) in
+                    [(partials.dpdu, partials.dndu, DVec2::X), (partials.dpdv, partials.dndv, DVec2::Y)]
+                {
+                    let h = 1e-4 / along.length();
+                    let (after, before) = (at(here.point + along * h).0, at(here.point - along * h).0);
+                    let moved = (after.uv - before.uv) / (2.0 * h);
+                    // Some roundings of the texture coordinates over the step, which a needle makes short.
+                    assert!((moved - step).length() < 1e-9 + 2e-12 * along.length(), "{uvs:?} {moved}");
+                    let turned = (after.shading - before.shading) / (2.0 * h);
+                    assert!((turned - turn).length() <= 1e-6 * along.length(), "{uvs:?} {turned} {turn}");
+                    assert!(
+                        along.dot(here.normal).abs() < 1e-10 * along.length()
+                            && turn.dot(here.shading).abs() < 1e-9 * along.length()
+                    );
+                }
+                assert_eq!(partials.dndu == DVec3::ZERO, normals.is_none());
+            }
+        }
+    }
+
+    #[test]
+    fn degenerate_texture_coordinates_give_way_to_edges() {
+        let line = [[0.0, 0.0], [1.0, 2.0], [2.0, 4.0]];
+        let point = [[0.5, 0.5]; 3];
+        let spoilt = [[f32::NAN, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let bent = [[0.1, -0.3, 1.0], [0.4, 0.2, 0.7], [-0.3, 0.5, 1.6]];
+        let opposed = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]];
+        let ray = Ray::new(DVec3::new(2.2, 2.9, 0.0), DVec3::Z);
+        let of = |mesh: &TriangleMesh<f64>| {
+            let hit = Geometry::<f64>::intersect(mesh, 0, &ray).unwrap();
+            mesh.partials(&ray, &hit)
+        };
+        let expected = of(&leaning(None, Some(bent)));
+        assert_eq!(expected.dpdu, DVec3::new(7.3, 0.4, 5.5) - DVec3::new(0.1, 0.2, 4.0));
+        for uvs in [line, point, spoilt] {
+            assert_eq!(of(&leaning(Some(uvs), Some(bent))), expected);
+        }
+        let flat = of(&leaning(None, None));
+        assert_eq!((flat.dndu, flat.dndv), (DVec3::ZERO, DVec3::ZERO));
+        let finite = |p: Partials| [p.dpdu, p.dpdv, p.dndu, p.dndv].iter().all(|v| v.is_finite());
+        assert!(finite(of(&leaning(Some(line), Some(opposed)))));
+        assert!(finite(of(&leaning(None, Some([[0.0; 3]; 3])))));
     }
 }

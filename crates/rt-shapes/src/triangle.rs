@@ -294,7 +294,7 @@ impl Triangle {
 }
 
 /// `2^k`, `k` the exponent of `x`, kept where it and its inverse are normal.
-fn power_of_two(x: f64) -> f64 {
+pub(crate) fn power_of_two(x: f64) -> f64 {
     let exponent = (x.to_bits() >> 52 & 0x7ff).clamp(30, 2000);
     f64::from_bits(exponent << 52)
 }
@@ -303,7 +303,7 @@ fn exact_minus(p: DVec3, q: DVec3) -> [Expansion<2>; 3] {
     [0, 1, 2].map(|i| Expansion::difference(p[i], q[i]))
 }
 
-fn exact_cross(p: &[Expansion<2>; 3], q: &[Expansion<2>; 3]) -> [Expansion<16>; 3] {
+pub(crate) fn exact_cross(p: &[Expansion<2>; 3], q: &[Expansion<2>; 3]) -> [Expansion<16>; 3] {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
         let left: Expansion<8> = p[i].times(&q[j]);
         let right: Expansion<8> = p[j].times(&q[i]);

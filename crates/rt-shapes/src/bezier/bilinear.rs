@@ -279,14 +279,14 @@ impl<R: Real> Primitive<R> for BilinearPatch {
     fn intersect_counted(&self, ray: &Ray<R>, counts: &mut Counts) -> Option<Hit<Uv, R>> {
         let mut work = PatchCounts::default();
         let hit = self.closest(ray, &mut work);
-        *counts += Counts { nodes: work.pieces, leaves: 0, prims: 1 };
+        *counts += Counts { nodes: work.pieces, prims: 1, ..Counts::default() };
         hit
     }
 
     fn intersect_p_counted(&self, ray: &Ray<R>, counts: &mut Counts) -> bool {
         let mut work = PatchCounts::default();
         let hit = self.any(ray, &mut work);
-        *counts += Counts { nodes: work.pieces, leaves: 0, prims: 1 };
+        *counts += Counts { nodes: work.pieces, prims: 1, ..Counts::default() };
         hit
     }
 }
