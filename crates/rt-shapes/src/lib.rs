@@ -43,7 +43,7 @@ mod triangle;
 
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
-pub use quadric::{Frustum, QuadricError, Root};
+pub use quadric::{Disk, Frustum, Quadric, QuadricError, Root};
 pub use sphere::{Sphere, SphereError};
 pub use surface::{Partials, Shape, Surface, Surfaced, Uv};
 pub use triangle::{Meeting, Triangle, moller_trumbore};

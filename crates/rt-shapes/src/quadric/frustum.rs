@@ -208,6 +208,10 @@ impl Form for Frustum {
     fn sweep(&self) -> Option<&Sweep> {
         None
     }
+    #[inline(always)]
+    fn twisted(&self) -> bool {
+        false
+    }
     fn scaled(&self, by: f64) -> Frustum {
         let times = |x: DoubleDouble| x * DoubleDouble::from(by);
         Frustum {

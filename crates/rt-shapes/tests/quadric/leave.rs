@@ -1,0 +1,1 @@
+//! Rays that leave a surface do not meet it where they start.

@@ -1,0 +1,7 @@
+//! Quadrics against exact arithmetic, finite differences and quadrature.
+
+mod frustum;
+mod judge;
+mod leave;
+mod revolved;
+mod surface;
