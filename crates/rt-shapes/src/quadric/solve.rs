@@ -370,6 +370,11 @@ fn settle<F: Form, R: Real>(
         _ if fine => Root { t, error: slack },
         _ => closest_wide(form, o, d, t, slack),
     };
+    // From a point of the surface, as far as can be told, the distance is none.
+    if root.t.abs() <= root.error {
+        root.t = 0.0;
+        root.error *= 2.0;
+    }
     if rough != Verdict::Inside || root.error > slack {
         match verdict::<F, DoubleDouble>(form, o, d, root.t, root.error) {
             Verdict::Inside => {}
