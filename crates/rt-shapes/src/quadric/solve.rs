@@ -46,12 +46,10 @@ pub(super) fn hits<F: Form, R: Real>(
     let Some(found) = candidates(form, o, d) else { return ControlFlow::Continue(()) };
     let mut last = f64::NEG_INFINITY;
     for candidate in found.into_iter().flatten() {
-        // In order, whatever the digits of either; and two that cannot be told apart are one.
-        if let Some(root) = settle::<F, R>(form, o, d, candidate, ray.t_min.into(), ray.t_max.reach())
-            && root.t > last
-        {
-            last = root.t;
-            if let Some(t) = ray.admit(root.t) {
+        if let Some(root) = settle::<F, R>(form, o, d, candidate, ray.t_min.into(), ray.t_max.reach()) {
+            // In order, whatever the digits of either.
+            last = root.t.max(last);
+            if let Some(t) = ray.admit(last) {
                 each(t)?;
             }
         }
@@ -73,7 +71,9 @@ fn roots_in_range<F: Form>(form: &F, o: DVec3, d: DVec3) -> [Option<Root>; 2] {
     let all = f64::INFINITY;
     let found = candidates(form, o, d).unwrap_or_default();
     let [near, far] = found.map(|c| settle::<F, f64>(form, o, d, c?, -all, all));
-    if near.map(|root| root.t) == far.map(|root| root.t) { [near, None] } else { [near, far] }
+    // In order, whatever the digits of either.
+    let least = near.map_or(-all, |root| root.t);
+    [near, far.map(|far| Root { t: far.t.max(least), error: far.error + (least - far.t).max(0.0) })]
 }
 
 /// [`roots`] for sizes whose products leave the range of `f64`: the same surface and line, in other units.
@@ -180,7 +180,8 @@ fn candidates_wide<F: Form>(
         return None;
     }
     let zero = DoubleDouble::from(0.0);
-    let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { zero };
+    // Only what is certainly two is two.
+    let root = if discriminant.value() > doubt { discriminant.sqrt() } else { zero };
     let q = if b < 0.0 { root - k.b } else { zero - k.b - root };
     // By how much the root of the discriminant may be off.
     let blur = if root.value() > 0.0 { (doubt / root.value()).min(doubt.sqrt()) } else { doubt.sqrt() };
@@ -193,9 +194,12 @@ fn candidates_wide<F: Form>(
         Candidate { t: at, slack: 2.0 * own + U * at.abs(), fine: true }
     };
     let near = |c: &Candidate| (c.t - t).abs() <= 2.0 * span + c.slack;
+    if root.value() == 0.0 && a.abs() > off[0] {
+        return Some([Some(candidate(q / k.a)), None]);
+    }
     if q.value() == 0.0 {
-        // All of the line lies in the surface, which it then does not cross; or it touches.
-        return (a.abs() > off[0]).then(|| [Some(candidate(zero)), None]);
+        // All of the line lies in the surface, which it then does not cross.
+        return None;
     }
     let second = if a.abs() > off[0] { Some(candidate(q / k.a)).filter(near) } else { None };
     let first = Some(candidate(k.c / q)).filter(near);
@@ -381,7 +385,7 @@ fn settle<F: Form, R: Real>(
             Verdict::Outside => return None,
             Verdict::Unsure(shift) => {
                 root.t += shift;
-                root.error += shift.abs();
+                root.error += shift.abs() + U * root.t.abs();
             }
         }
     }
