@@ -106,17 +106,17 @@ impl Disk {
         }
     }
 
-    /// Whether the line meets the ring, and not only its plane; `None` if the digits do not tell.
+    /// Whether the line meets the ring, and not only its plane; `None` if the digits do not tell. All in units of `1 / by`, the
+    /// direction in whichever.
     #[inline(always)]
-    fn decide<T: Number>(&self, o: DVec3, d: DVec3) -> Option<bool> {
-        let t = T::difference(self.height, o.z) / d.z.into();
-        // In units of the disk, so that squares stay in range.
-        let unit = 1.0 / f64::from_bits((self.outer.to_bits() >> 52).clamp(30, 2000) << 52);
-        let [x, y] = [0, 1].map(|i| (T::from(o[i]) + t * d[i].into()) * unit.into());
-        let size = |i: usize| o[i].abs() * unit + (t.value() * unit * d[i]).abs();
+    fn decide<T: Number>(&self, o: DVec3, d: DVec3, by: f64) -> Option<bool> {
+        let t = T::difference(self.height * by, o.z) / d.z.into();
+        let [x, y] = [0, 1].map(|i| T::from(o[i]) + t * d[i].into());
         // Two roundings of the quotient, one each of product and sum; products of parts lost below are counted with them.
+        let size = |i: usize| o[i].abs() + (t.value() * d[i]).abs();
         let off = 8.0 * T::U * size(0).max(size(1)) + f64::MIN_POSITIVE;
-        if x.value().abs() > 4.0 + off || y.value().abs() > 4.0 + off {
+        let [inner, outer] = [self.inner, self.outer].map(|r| T::from(r * by));
+        if x.value().abs() > 2.0 * outer.value() + off || y.value().abs() > 2.0 * outer.value() + off {
             return Some(false);
         }
         let square = x * x + y * y;
@@ -129,7 +129,6 @@ impl Disk {
             open |= value.abs() <= bound || value.is_nan();
             value >= -bound || value.is_nan()
         };
-        let [inner, outer] = [self.inner, self.outer].map(|r| T::from(r) * unit.into());
         let mut met = least((outer * outer - square).value(), bound(outer));
         met = met && (self.inner == 0.0 || least((square - inner * inner).value(), bound(inner)));
         if let Some(sweep) = &self.sweep {
@@ -144,14 +143,21 @@ impl Disk {
     /// The distance along the line, correctly rounded up to ties, if it meets.
     #[inline(always)]
     fn root(&self, o: DVec3, d: DVec3) -> Option<f64> {
-        let finite = o.is_finite() && d.is_finite();
-        if d.z == 0.0 || !finite || !self.decide::<f64>(o, d).unwrap_or(true) {
+        if d.z == 0.0 || !(o.is_finite() && d.is_finite()) {
             return None;
         }
-        if self.decide::<f64>(o, d).is_none() && !self.decide::<DoubleDouble>(o, d).unwrap_or(true) {
+        // In units of powers of two, so that products stay in range.
+        let power = |x: f64| f64::from_bits((x.to_bits() >> 52).clamp(30, 2000) << 52);
+        let unit = power(o.abs().max_element().max(self.height.abs()).max(self.outer));
+        let pace = power(d.abs().max_element());
+        let (by, p, v) = (1.0 / unit, o / unit, d / pace);
+        let met = self.decide::<f64>(p, v, by).or_else(|| self.decide::<DoubleDouble>(p, v, by));
+        // What twice the digits leave open is a hit.
+        if met == Some(false) {
             return None;
         }
-        Some((DoubleDouble::difference(self.height, o.z) / d.z.into()).value())
+        let t = (DoubleDouble::difference(self.height * by, p.z) / v.z.into()).value();
+        Some(if (t * unit).is_finite() { t * unit / pace } else { t / pace * unit })
     }
 }
 

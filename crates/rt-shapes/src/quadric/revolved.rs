@@ -80,6 +80,16 @@ fn positive(radius: f64) -> Result<f64, QuadricError> {
     if radius > 0.0 && radius.is_finite() { Ok(radius) } else { Err(QuadricError::Radius(radius)) }
 }
 
+/// One over the power of two next to a size: a unit in which products of sizes stay in range.
+fn reciprocal(size: f64) -> f64 {
+    1.0 / f64::from_bits((size.to_bits() >> 52).clamp(30, 2000) << 52)
+}
+
+/// The length, where squares may leave the range of `f64`.
+fn length(p: DVec2) -> f64 {
+    p.x.hypot(p.y)
+}
+
 fn range(min: f64, max: f64) -> Result<[f64; 2], QuadricError> {
     if min < max && (max - min).is_finite() { Ok([min, max]) } else { Err(QuadricError::Range { min, max }) }
 }
@@ -184,14 +194,18 @@ impl Quadric {
             Kind::Sphere { radius } => (0.0, [zero, wide(radius)], [wide(1.0), zero], 1.0, zero),
             Kind::Cylinder { radius } => (z[0], [zero, wide(radius)], [zero, zero], 1.0, zero),
             Kind::Cone { height, radius } => {
-                (height, [zero, zero], [zero, wide(radius) / wide(height)], 1.0, zero)
+                let by = reciprocal(height.max(radius));
+                (height, [zero, zero], [zero, wide(radius * by) / wide(height * by)], 1.0, zero)
             }
             Kind::Paraboloid { height, radius } => {
-                (0.0, [zero, zero], [zero, zero], 1.0, wide(radius) / wide(height) * wide(radius))
+                let by = reciprocal(height.max(radius));
+                let slope = wide(radius * by) / wide(height * by) * wide(radius * by) / wide(by);
+                (0.0, [zero, zero], [zero, zero], 1.0, slope)
             }
             Kind::Hyperboloid { from, to } => {
-                let rise = DoubleDouble::difference(to.z, from.z);
-                let grows = [0, 1].map(|i| DoubleDouble::difference(to[i], from[i]) / rise);
+                let by = reciprocal(from.abs().max(to.abs()).max_element());
+                let difference = |i: usize| DoubleDouble::difference(to[i] * by, from[i] * by);
+                let grows = [0, 1].map(|i| difference(i) / difference(2));
                 (from.z, [wide(from.x), wide(from.y)], grows, -1.0, zero)
             }
         };
@@ -250,7 +264,7 @@ impl Quadric {
 
     /// The least and the greatest distance from the axis, up to rounding.
     fn radii(&self) -> [f64; 2] {
-        let [a, b] = self.z.map(|z| self.generator(z).length());
+        let [a, b] = self.z.map(|z| length(self.generator(z)));
         let middle = match self.kind {
             Kind::Sphere { radius } if self.z[0] <= 0.0 && self.z[1] >= 0.0 => radius,
             _ => a,
@@ -424,8 +438,10 @@ impl WorldBound for Quadric {
             // Along a ruling coordinates are linear: the ends say all.
             Kind::Hyperboloid { .. } => self.z.map(|z| {
                 let g = self.generator(z);
-                let whole = self.twist_free() && (g.x == 0.0 || g.y == 0.0);
-                let radius = if whole { g.length() } else { g.length() * most };
+                // At its own ends the generator is exact, and its length too beside the x or y axis.
+                let exact = matches!(self.kind, Kind::Hyperboloid { from, to } if z == from.z || z == to.z);
+                let exact = exact && (g.x == 0.0 || g.y == 0.0);
+                let radius = if exact { length(g) } else { length(g) * most };
                 if g == DVec2::ZERO { [DVec2::ZERO; 2] } else { arc(sweep, g, radius) }
             }),
             // At each angle the distance from the axis takes all values between the least and the greatest.
@@ -440,13 +456,6 @@ impl WorldBound for Quadric {
         };
         let (min, max) = (arcs[0][0].min(arcs[1][0]), arcs[0][1].max(arcs[1][1]));
         Aabb::from_f64(min.extend(self.z[0]), max.extend(self.z[1]), origin)
-    }
-}
-
-impl Quadric {
-    /// Whether the ends of the generator are as they were given, not cut.
-    fn twist_free(&self) -> bool {
-        matches!(self.kind, Kind::Hyperboloid { from, to } if self.z == [from.z, to.z])
     }
 }
 

@@ -1,5 +1,6 @@
 //! Quadrics against exact arithmetic, finite differences and quadrature.
 
+mod corners;
 mod frustum;
 mod judge;
 mod leave;

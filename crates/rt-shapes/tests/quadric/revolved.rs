@@ -231,7 +231,6 @@ fn no_root_is_missed_in_millions() {
     let number = |name, default| std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(default);
     let tally = run(number("RT_SEED", 1), number("RT_CASES", 1_000_000));
     assert_eq!((tally.missed, tally.beyond, tally.coarse), (0, 0, 0), "{tally:?}");
-    println!("{tally:?}");
 }
 
 #[test]
