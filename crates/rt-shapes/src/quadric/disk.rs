@@ -1,8 +1,8 @@
 //! [`Disk`]: flat disks and rings, whole or swept in part.
 
-use super::QuadricError;
 use super::form::Number;
 use super::sweep::{Sweep, arc, direction, share};
+use super::{LARGEST, QuadricError};
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::TAU;
 use core::ops::ControlFlow;
@@ -59,10 +59,10 @@ impl Disk {
     ///
     /// When the height is not finite, the outer radius not finite and positive, or the inner one not at least 0 and below it.
     pub fn ring(height: f64, inner: f64, outer: f64) -> Result<Disk, QuadricError> {
-        if !height.is_finite() {
+        if height.abs() > LARGEST || height.is_nan() {
             return Err(QuadricError::Height(height));
         }
-        if !(outer > 0.0 && outer.is_finite()) {
+        if !(outer > 0.0 && outer <= LARGEST) {
             return Err(QuadricError::Radius(outer));
         }
         if !(inner >= 0.0 && inner < outer) {

@@ -3,7 +3,7 @@
 use super::form::{Extent, Form, Number, Terms};
 use super::partials::weingarten;
 use super::sweep::{Sweep, arc, direction, share};
-use super::{QuadricError, Root, part, solve, surface};
+use super::{LARGEST, QuadricError, Root, part, solve, surface};
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::TAU;
 use core::ops::ControlFlow;
@@ -32,7 +32,7 @@ use rt_geom::{Ray, Real};
 /// moved to the border within its error. A line that lies in the surface does not meet it.
 ///
 /// The ends of a sweep are the directions that `cos` and `sin` of the angles round to. Sizes, distances and components of
-/// directions may span `2^150`; beyond, all is rounded as `f64` rounds.
+/// directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e300`.
 ///
 /// Source: the parametrisations: Pharr and Humphreys, *Physically Based Rendering* (2004), sections 3.2 to 3.5; double-double
 /// arithmetic: Dekker (1971), see [`DoubleDouble`].
@@ -77,7 +77,7 @@ enum Kind {
 }
 
 fn positive(radius: f64) -> Result<f64, QuadricError> {
-    if radius > 0.0 && radius.is_finite() { Ok(radius) } else { Err(QuadricError::Radius(radius)) }
+    if radius > 0.0 && radius <= LARGEST { Ok(radius) } else { Err(QuadricError::Radius(radius)) }
 }
 
 /// One over the power of two next to a size: a unit in which products of sizes stay in range.
@@ -91,7 +91,8 @@ fn length(p: DVec2) -> f64 {
 }
 
 fn range(min: f64, max: f64) -> Result<[f64; 2], QuadricError> {
-    if min < max && (max - min).is_finite() { Ok([min, max]) } else { Err(QuadricError::Range { min, max }) }
+    let large = min.abs().max(max.abs()).max(max - min);
+    if min < max && large <= LARGEST { Ok([min, max]) } else { Err(QuadricError::Range { min, max }) }
 }
 
 impl Quadric {
@@ -120,7 +121,7 @@ impl Quadric {
     ///
     /// When one of them is not finite and positive.
     pub fn cone(height: f64, radius: f64) -> Result<Quadric, QuadricError> {
-        if !(height > 0.0 && height.is_finite()) {
+        if !(height > 0.0 && height <= LARGEST) {
             return Err(QuadricError::Height(height));
         }
         Ok(Quadric::new(Kind::Cone { height, radius: positive(radius)? }, [0.0, height]))
@@ -150,7 +151,7 @@ impl Quadric {
     /// When a point is not finite, both are at the same height (which makes a [`Disk`](crate::Disk)), or both lie on the axis.
     pub fn hyperboloid(p: DVec3, q: DVec3) -> Result<Quadric, QuadricError> {
         for point in [p, q] {
-            if !point.is_finite() {
+            if !(point.abs().max_element() <= LARGEST && point.is_finite()) {
                 return Err(QuadricError::Point(point));
             }
         }
