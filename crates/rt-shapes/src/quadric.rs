@@ -3,7 +3,6 @@
 mod disk;
 mod form;
 mod frustum;
-mod part;
 mod partials;
 mod revolved;
 mod solve;

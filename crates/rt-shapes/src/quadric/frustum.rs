@@ -3,7 +3,7 @@
 use super::form::{Extent, Form, Number, Terms};
 use super::solve;
 use super::sweep::Sweep;
-use super::{LARGEST, QuadricError, Root, part, surface};
+use super::{LARGEST, QuadricError, Root, surface};
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::{PI, TAU};
 use core::ops::ControlFlow;
@@ -253,7 +253,7 @@ impl<R: Real> Primitive<R> for Frustum {
 
     #[inline]
     fn intersect(&self, ray: &Ray<R>) -> Option<Hit<Uv, R>> {
-        part::closest(self, ray)
+        solve::closest(self, ray)
     }
     fn all_hits(&self, ray: &Ray<R>, each: &mut dyn FnMut(Hit<Uv, R>) -> ControlFlow<()>) -> ControlFlow<()> {
         solve::hits(self, ray, |t| each(Hit { t, at: Uv::default() }))

@@ -3,7 +3,7 @@
 use super::form::{Extent, Form, Number, Terms};
 use super::partials::weingarten;
 use super::sweep::{Sweep, arc, direction, share};
-use super::{LARGEST, QuadricError, Root, part, solve, surface};
+use super::{LARGEST, QuadricError, Root, solve, surface};
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::TAU;
 use core::ops::ControlFlow;
@@ -373,6 +373,41 @@ impl Quadric {
         DVec2::new(share(self.angles, self.beside(p)), v.clamp(0.0, 1.0))
     }
 
+    /// Derivatives at a point of the surface.
+    fn partials_at(&self, point: DVec3, normal: DVec3) -> Partials {
+        let range = self.angles[1] - self.angles[0];
+        let (rise, p) = (self.z[1] - self.z[0], point.truncate());
+        let around = |v: DVec2| (v.perp() * range).extend(0.0);
+        let rho = p.length();
+        let out = p.try_normalize().unwrap_or(DVec2::X);
+        let (dpdu, inward) = (around(p), (-p * (range * range)).extend(0.0));
+        // The derivative along v, and the second one; that along both is the former turned.
+        let (dpdv, bent) = match self.kind {
+            Kind::Sphere { .. } => {
+                let [low, high] = self.polar();
+                let range = high - low;
+                ((out * point.z).extend(-rho) * range, -point * (range * range))
+            }
+            Kind::Cylinder { .. } => (DVec3::Z * rise, DVec3::ZERO),
+            Kind::Cone { height, radius } => ((out * (-radius / height)).extend(1.0) * rise, DVec3::ZERO),
+            Kind::Paraboloid { height, radius } => {
+                // rho = sqrt(g z), hence rho' = g / (2 rho).
+                let grows = 0.5 * radius / height * radius / rho;
+                if !grows.is_finite() {
+                    return Partials { dpdu, ..Partials::default() };
+                }
+                let bent = out * (-grows * grows / rho * (rise * rise));
+                ((out * grows).extend(1.0) * rise, bent.extend(0.0))
+            }
+            Kind::Hyperboloid { .. } => {
+                let m = DVec2::new(self.grows[0].value(), self.grows[1].value());
+                let turn = self.beside(point).try_normalize().unwrap_or(DVec2::X);
+                (m.rotate(turn).extend(1.0) * rise, DVec3::ZERO)
+            }
+        };
+        weingarten(dpdu, dpdv, [inward, around(dpdv.truncate()), bent], normal)
+    }
+
     /// The angles from the pole at the lower and the upper end of a sphere.
     fn polar(&self) -> [f64; 2] {
         self.z.map(|z| self.generator(z).x.atan2(z))
@@ -465,7 +500,7 @@ impl<R: Real> Primitive<R> for Quadric {
 
     #[inline]
     fn intersect(&self, ray: &Ray<R>) -> Option<Hit<Uv, R>> {
-        part::closest(self, ray)
+        solve::closest(self, ray)
     }
     fn all_hits(&self, ray: &Ray<R>, each: &mut dyn FnMut(Hit<Uv, R>) -> ControlFlow<()>) -> ControlFlow<()> {
         solve::hits(self, ray, |t| each(Hit { t, at: Uv::default() }))
@@ -480,42 +515,5 @@ impl<R: Real> Shape<R> for Quadric {
     fn partials(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Partials {
         let Surface { point, normal, .. } = self.surface(ray, hit);
         self.partials_at(point, normal)
-    }
-}
-
-impl Quadric {
-    /// Derivatives at a point of the surface.
-    fn partials_at(&self, point: DVec3, normal: DVec3) -> Partials {
-        let range = self.angles[1] - self.angles[0];
-        let (rise, p) = (self.z[1] - self.z[0], point.truncate());
-        let around = |v: DVec2| (v.perp() * range).extend(0.0);
-        let rho = p.length();
-        let out = p.try_normalize().unwrap_or(DVec2::X);
-        let (dpdu, inward) = (around(p), (-p * (range * range)).extend(0.0));
-        // The derivative along v, and the second one; that along both is the former turned.
-        let (dpdv, bent) = match self.kind {
-            Kind::Sphere { .. } => {
-                let [low, high] = self.polar();
-                let range = high - low;
-                ((out * point.z).extend(-rho) * range, -point * (range * range))
-            }
-            Kind::Cylinder { .. } => (DVec3::Z * rise, DVec3::ZERO),
-            Kind::Cone { height, radius } => ((out * (-radius / height)).extend(1.0) * rise, DVec3::ZERO),
-            Kind::Paraboloid { height, radius } => {
-                // rho = sqrt(g z), hence rho' = g / (2 rho).
-                let grows = 0.5 * radius / height * radius / rho;
-                if !grows.is_finite() {
-                    return Partials { dpdu, ..Partials::default() };
-                }
-                let bent = out * (-grows * grows / rho * (rise * rise));
-                ((out * grows).extend(1.0) * rise, bent.extend(0.0))
-            }
-            Kind::Hyperboloid { .. } => {
-                let m = DVec2::new(self.grows[0].value(), self.grows[1].value());
-                let turn = self.beside(point).try_normalize().unwrap_or(DVec2::X);
-                (m.rotate(turn).extend(1.0) * rise, DVec3::ZERO)
-            }
-        };
-        weingarten(dpdu, dpdv, [inward, around(dpdv.truncate()), bent], normal)
     }
 }

@@ -2,7 +2,9 @@
 
 use super::Root;
 use super::form::{Coefficients, Extent, Form, Number, offset, signed, size, uncertain};
+use crate::Uv;
 use core::ops::ControlFlow;
+use rt_accel::Hit;
 use rt_geom::expansion::DoubleDouble;
 use rt_geom::glam::{DVec2, DVec3};
 use rt_geom::{Ray, Real, Vector};
@@ -55,6 +57,17 @@ pub(super) fn hits<F: Form, R: Real>(
         }
     }
     ControlFlow::Continue(())
+}
+
+/// The first hit.
+#[inline(always)]
+pub(super) fn closest<F: Form, R: Real>(form: &F, ray: &Ray<R>) -> Option<Hit<Uv, R>> {
+    let mut first = None;
+    let _ = hits(form, ray, |t| {
+        first = Some(Hit { t, at: Uv::default() });
+        ControlFlow::Break(())
+    });
+    first
 }
 
 /// Both roots on the surface, whatever their sign, with their errors.
