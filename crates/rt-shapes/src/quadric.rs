@@ -31,15 +31,15 @@ pub struct Root {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum QuadricError {
-    /// A point that is not finite, or beyond `1e300`, or as far from its partner.
+    /// A point that is not finite, or beyond `1e290`, or as far from its partner.
     Point(DVec3),
-    /// A radius that is negative, NaN or beyond `1e300`, or zero where it must not be.
+    /// A radius that is negative, NaN or beyond `1e290`, or zero where it must not be.
     Radius(f64),
     /// Base and top are the same point.
     NoAxis(DVec3),
-    /// A height that is NaN or beyond `1e300`, or not positive where it must be.
+    /// A height that is NaN or beyond `1e290`, or not positive where it must be.
     Height(f64),
-    /// A range of heights that is empty, inverted, NaN, beyond `1e300`, or not on the surface.
+    /// A range of heights that is empty, inverted, NaN, beyond `1e290`, or not on the surface.
     Range {
         /// The lower end, as given.
         min: f64,
@@ -66,12 +66,12 @@ impl fmt::Display for QuadricError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             QuadricError::Point(p) => {
-                write!(f, "point {p}, or its distance from its partner, is not a number up to 1e300")
+                write!(f, "point {p}, or its distance from its partner, is not a number up to 1e290")
             }
-            QuadricError::Radius(r) => write!(f, "radius {r} is not a positive number up to 1e300"),
+            QuadricError::Radius(r) => write!(f, "radius {r} is not a positive number up to 1e290"),
             QuadricError::NoAxis(p) => write!(f, "there is no axis from {p} to itself"),
             QuadricError::Height(h) => {
-                write!(f, "height {h} is not a number up to 1e300, or not a positive one")
+                write!(f, "height {h} is not a number up to 1e290, or not a positive one")
             }
             QuadricError::Range { min, max } => {
                 write!(f, "heights from {min} to {max} are no part of the surface with an extent")
@@ -89,7 +89,7 @@ impl fmt::Display for QuadricError {
 impl core::error::Error for QuadricError {}
 
 /// Beyond this size double-double products overflow.
-const LARGEST: f64 = 1e300;
+const LARGEST: f64 = 1e290;
 
 /// `center - half` rounded down and `center + half` rounded up.
 fn outward(center: f64, half: f64) -> (f64, f64) {

@@ -54,7 +54,7 @@ impl Frustum {
     ///
     /// # Errors
     ///
-    /// When a point is not finite or both are the same, a radius is negative or NaN, both are zero, or anything exceeds `1e300`.
+    /// When a point is not finite or both are the same, a radius is negative or NaN, both are zero, or anything exceeds `1e290`.
     pub fn new(base: DVec3, r0: f64, top: DVec3, r1: f64) -> Result<Frustum, QuadricError> {
         for p in [base, top] {
             if !(p.abs().max_element() <= LARGEST && p.is_finite()) {

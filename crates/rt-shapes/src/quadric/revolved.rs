@@ -32,7 +32,7 @@ use rt_geom::{Ray, Real};
 /// moved to the border within its error. A line that lies in the surface does not meet it.
 ///
 /// The ends of a sweep are the directions that `cos` and `sin` of the angles round to. Sizes, distances and components of
-/// directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e300`.
+/// directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e290`.
 ///
 /// Source: the parametrisations: Pharr and Humphreys, *Physically Based Rendering* (2004), sections 3.2 to 3.5; double-double
 /// arithmetic: Dekker (1971), see [`DoubleDouble`].

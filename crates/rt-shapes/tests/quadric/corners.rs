@@ -25,7 +25,7 @@ fn what_is_no_quadric_says_why() {
     assert_eq!(ball.clone().cut(0.5, -0.5), Err(QuadricError::Range { min: 0.5, max: -0.5 }));
     assert!(ball.clone().cut(1.0, 2.0).is_err() && ball.clone().cut(nan, 1.0).is_err());
     assert_eq!(ball.clone().cut(-9.0, 9.0).unwrap(), ball);
-    assert!(Quadric::sphere(2e300).is_err() && Frustum::cone(o, 2e300, z).is_err());
+    assert!(Quadric::sphere(2e290).is_err() && Frustum::cone(o, 2e290, z).is_err());
     for (from, to) in [(1.0, 1.0), (1.0, 0.0), (0.0, 7.0), (nan, 1.0), (0.0, nan), (f64::NEG_INFINITY, 0.0)] {
         assert!(matches!(ball.clone().swept(from, to), Err(QuadricError::Sweep { .. })), "{from} {to}");
         assert!(Disk::new(0.0, 1.0).unwrap().swept(from, to).is_err());
@@ -37,7 +37,7 @@ fn what_is_no_quadric_says_why() {
     assert_eq!(Frustum::cylinder(o, z, 0.0), Err(QuadricError::Radius(0.0)));
     assert_eq!(Frustum::cone(o, -1.0, z), Err(QuadricError::Radius(-1.0)));
     assert!(Frustum::cone(DVec3::NAN, 1.0, z).is_err() && Frustum::cone(o, nan, z).is_err());
-    assert_eq!(QuadricError::Radius(-1.0).to_string(), "radius -1 is not a positive number up to 1e300");
+    assert_eq!(QuadricError::Radius(-1.0).to_string(), "radius -1 is not a positive number up to 1e290");
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn rays_that_are_none_meet_nothing() {
 
 #[test]
 fn sizes_and_speeds_beyond_any_product_are_met() {
-    for size in [1e-300, 1e-165, 1e-30, 1.0, 1e30, 1e165, 1e299] {
+    for size in [1e-300, 1e-165, 1e-30, 1.0, 1e30, 1e165, 1e289] {
         for speed in [1e-250, 1e-160, 1e-30, 1.0, 1e30, 1e160, 1e250] {
             let shapes = [
                 Quadric::sphere(size).unwrap(),
