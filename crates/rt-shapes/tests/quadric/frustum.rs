@@ -80,7 +80,7 @@ fn run(seed: u64, count: u64) -> Tally {
             let normal = (out * (top - base).length() - unit * (r1 - r0)).normalize();
             ((o - base).length() + (d * t).length() + r0) / (normal.dot(d) * t).abs()
         };
-        tally.judge(&truth, shape.roots(o, d), condition, case);
+        tally.judge(&truth, shape.roots(o, d), condition, |_| true, case);
     }
     tally
 }

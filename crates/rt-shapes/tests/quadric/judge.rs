@@ -14,6 +14,9 @@ pub(crate) struct Tally {
     pub(crate) cases: u64,
     pub(crate) roots: u64,
     pub(crate) missed: u64,
+    /// Roots that are none, but cannot be told from one within their bound.
+    pub(crate) doubtful: u64,
+    /// Roots that are none.
     pub(crate) invented: u64,
     /// Beyond the reported bound.
     pub(crate) beyond: u64,
@@ -36,6 +39,7 @@ impl Tally {
         truth: &[Rational],
         found: [Option<Root>; 2],
         condition: impl Fn(f64) -> f64,
+        near: impl Fn(Root) -> bool,
         case: impl core::fmt::Debug,
     ) {
         self.cases += 1;
@@ -75,6 +79,13 @@ impl Tally {
                 }
             }
         }
-        self.invented += left.len() as u64;
+        for root in left {
+            if near(root) {
+                self.doubtful += 1;
+            } else {
+                self.invented += 1;
+                self.tell(format!("invented {root:?} of {case:?}: {found:?}"));
+            }
+        }
     }
 }
