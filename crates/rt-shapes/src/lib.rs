@@ -29,8 +29,8 @@
 //!
 //! This crate knows no structure. The `t` of a triangle is the exact distance, correctly rounded to the ray's precision, whatever
 //! the condition of the problem; so neighbours that are met at a shared vertex are met at one `t`. That of a sphere is within
-//! `2^-33` of half a unit in the last place. Of a [`Quadric`] or [`Frustum`] see there: its decisions have twice the digits of `f64`, and
-//! what these leave open is a hit.
+//! `2^-33` of half a unit in the last place. A [`Quadric`], [`Frustum`] or [`Disk`] is
+//! decided with up to twice the digits of `f64`, and what these leave open is a hit.
 //!
 //! [`Uv`] is `f32` for rays of either precision: it orders nothing and decides nothing, and [`Surface`] is computed afresh in
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.

@@ -18,7 +18,8 @@ use rt_geom::{Ray, Real};
 /// It is placed by its two points, without a matrix or its inverse, and kept in `f64`; answers rays of both precisions. The
 /// normal points away from the axis; `u` goes once around, `v` from the base to the top.
 ///
-/// A line is decided about as by all quadrics here, see [`Quadric`](super::Quadric): no hit is missed. Both rims belong to it.
+/// A line is decided about as by all quadrics here, see [`Quadric`](super::Quadric): no hit is missed. Both rims belong to
+/// it. An apex has no normal; the direction of the axis stands in for it, and rays that leave from there may meet the side.
 ///
 /// ```
 /// use rt_accel::Primitive;

@@ -16,23 +16,26 @@ use rt_geom::{Ray, Real};
 /// A sphere, cylinder, cone, paraboloid or hyperboloid about the z axis: all of it, or from one height to another and from one
 /// angle to another. Open where it is cut.
 ///
-/// In object space and kept in `f64`; an [`Instance`](rt_accel::Instance) places it in the world. Answers rays of both precisions.
-/// Its borders belong to it. The normal points away from the axis; `u` goes counter-clockwise around from the first angle to the
+/// In object space and kept in `f64`; an [`Instance`](rt_accel::Instance) places it in the world. Answers rays of both
+/// precisions. Its borders belong to it. The normal points away from the axis; `u` goes counter-clockwise around from the first angle to the
 /// last, `v` upward: as the angle from the pole does on a sphere, as `z` does on the others.
 ///
 /// # How it is decided
 ///
-/// The equation is a signed sum of squares of linear functions. Its coefficients are taken about the point of the line nearest to
-/// the middle of the surface, so that nothing cancels for a small far or a huge near one, first in `f64` with a bound on their
-/// error. What the bound leaves open (tangents, lines along a ruling, a vanishing leading coefficient) is computed again with twice
-/// the digits, and what even these leave open, some `2^-90` of the size, is a hit: none is missed. Roots that need it are polished
-/// by Newton's steps on the equation with twice the digits; they are within one unit in the last place of the exact ones where the
-/// problem is not worse conditioned than about `10^14`, and always within the error that [`Quadric::roots`] reports. Limits of
-/// height and angle are decided by signs at the root, never by an arc tangent; a root that may lie on a border does, and `t` is then
-/// moved to the border within its error. A line that lies in the surface does not meet it.
+/// The equation is a signed sum of squares of linear functions. Its coefficients are taken about the point of the line
+/// nearest to the middle of the surface, so that nothing cancels for a small far or a huge near one, first in `f64` with a
+/// bound on their error. What the bound leaves open (tangents, lines along a ruling, a vanishing leading coefficient) is
+/// computed again with twice the digits. What even these leave open, some `2^-90` of the size, is a hit: none is missed.
+///
+/// Roots that need it are polished by Newton's steps on the equation with twice the digits. They are within two units in
+/// the last place of the exact ones while the condition is below `10^6`, and always within the error that
+/// [`Quadric::roots`] reports. Limits of height and angle are decided by signs at the root, never by an arc tangent; a root
+/// that may lie on a border does, and `t` is then moved to the border within its error; a distance that may be 0 is. A line
+/// that lies in the surface does not meet it.
 ///
 /// The ends of a sweep are the directions that `cos` and `sin` of the angles round to. Sizes, distances and components of
-/// directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e290`.
+/// directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e290`;
+/// [`Surface`] records and areas want sizes from `1e-70` to `1e70`.
 ///
 /// Source: the parametrisations: Pharr and Humphreys, *Physically Based Rendering* (2004), sections 3.2 to 3.5; double-double
 /// arithmetic: Dekker (1971), see [`DoubleDouble`].

@@ -63,7 +63,7 @@ pub(super) fn arc(sweep: Option<&Sweep>, zero: DVec2, radius: f64) -> [DVec2; 2]
     }
     for end in sweep.iter().flat_map(|sweep| sweep.ends) {
         // Both directions are rounded, and so is the product: outward by more than that.
-        let p = zero.normalize().rotate(end) * radius;
+        let p = (zero / zero.abs().max_element()).normalize().rotate(end) * radius;
         let pad = DVec2::splat(8.0 * f64::EPSILON * radius);
         grow((p - pad).max(DVec2::splat(-radius)));
         grow((p + pad).min(DVec2::splat(radius)));
