@@ -56,7 +56,7 @@ impl fmt::Display for Mismatch {
 }
 
 /// One contestant's figures.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measured {
     /// The structure, or the rival.
     pub structure: String,
@@ -200,9 +200,7 @@ pub(crate) fn contest(
             sah: c.sah,
             error,
             has_t: matches!(c.answers, Answers::Closest32(_) | Answers::Closest64(_)),
-            void: None,
-            figures: Vec::new(),
-            on_front: false,
+            ..Measured::default()
         });
         let mut measured: Vec<Measured> = measured.collect();
         mark_front(&mut measured, weigh);

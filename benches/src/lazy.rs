@@ -103,12 +103,8 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
             ns_per_ray: race.median(k) / rays.len().max(1) as f64,
             spread: race.spread(k),
             speed: race.ratio(0, k),
-            nodes_per_ray: None,
-            tests_per_ray: None,
-            sah: None,
             error: nobody_missed(rays.len()),
-            has_t: false,
-            on_front: false,
+            ..Measured::default()
         }
     };
     let total = race(

@@ -119,10 +119,9 @@ pub(crate) fn compare(
         speed: race.ratio(0, k),
         nodes_per_ray: Some(work[k].nodes as f64 / n),
         tests_per_ray: Some(work[k].prims as f64 / n),
-        sah: None,
         error: against(&said[0], &said[k]),
         has_t: true,
-        on_front: false,
+        ..Measured::default()
     });
     let mut measured: Vec<Measured> = measured.collect();
     mark_front(&mut measured, Weigh::Error);

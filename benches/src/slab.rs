@@ -199,19 +199,11 @@ fn timed(
     let measured = WAYS.iter().zip(errors).enumerate().map(|(i, (way, error))| Measured {
         structure: way.name.into(),
         params: if way.never_misses { "conservative".into() } else { "fast".into() },
-        build_ms: None,
-        bytes_per_prim: None,
         ns_per_ray: race.median(i) / tests,
         spread: race.spread(i),
         speed: race.ratio(0, i),
-        nodes_per_ray: None,
-        tests_per_ray: None,
-        sah: None,
         error: *error,
-        has_t: false,
-        void: None,
-        figures: Vec::new(),
-        on_front: false,
+        ..Measured::default()
     });
     let mut measured: Vec<Measured> = measured.collect();
     mark_front(&mut measured, Weigh::Misses);

@@ -255,19 +255,14 @@ fn timed(
         Measured {
             structure: way.name.into(),
             params: String::new(),
-            build_ms: None,
-            bytes_per_prim: None,
             ns_per_ray: race.median(i) / n,
             spread: race.spread(i),
             speed: race.ratio(0, i),
             nodes_per_ray: Some(bounds as f64 / n),
             tests_per_ray: Some(asked as f64 / n),
-            sah: None,
             error: errors[i],
-            has_t: false,
-            void: None,
             figures: vec![("S", surface(way)), ("false", idle as f64 / n)],
-            on_front: false,
+            ..Measured::default()
         }
     });
     let mut measured: Vec<Measured> = measured.collect();

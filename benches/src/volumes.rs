@@ -333,19 +333,11 @@ fn weigh(kind: &Kind, stage: &Stage, plan: Plan) -> [Group; 2] {
     let plain = |structure: &str, params: &str, who: usize, n: f64| Measured {
         structure: structure.into(),
         params: params.into(),
-        build_ms: None,
-        bytes_per_prim: None,
         ns_per_ray: race.median(who) / n,
         spread: race.spread(who),
         speed: 1.0,
-        nodes_per_ray: None,
-        tests_per_ray: None,
-        sah: None,
         error,
-        has_t: false,
-        void: None,
-        figures: Vec::new(),
-        on_front: false,
+        ..Measured::default()
     };
     let mut fit: Vec<Measured> = Vec::new();
     for (i, (e, f)) in entrants.iter().zip(&figures).enumerate() {
