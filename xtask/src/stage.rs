@@ -46,6 +46,13 @@ pub(crate) fn load(name: &str, size: Option<u32>) -> Result<Scene, Failure> {
     rt_scenes::by_name(name, size).map_err(|e| Failure::Usage(e.to_string()))
 }
 
+/// A precision of rays, by name.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+pub(crate) enum Bits {
+    F32,
+    F64,
+}
+
 /// A precision of rays, and which scenes they can be shot into.
 pub(crate) trait Precision: Real {
     fn stage(

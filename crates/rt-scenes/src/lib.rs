@@ -26,12 +26,16 @@ pub mod soup;
 pub mod spd;
 pub mod stadium;
 
+mod facet;
 mod numbers;
 mod scene;
 mod solid;
 mod teapot;
 mod trial;
+mod tube;
 
+pub use facet::Facet;
 pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, by_name, names};
 pub use solid::Solid;
 pub use trial::{Closed, Trial, closed_meshes, fine_trials, trials};
+pub use tube::Tube;

@@ -260,7 +260,16 @@ type Maker = fn(Option<u32>) -> Result<Scene, SceneError>;
 /// All scenes, each by name.
 const SCENES: &[(&str, Maker)] = &[
     ("balls", |size| spd::balls(size.unwrap_or(4))),
+    ("gears", |size| spd::gears(size.unwrap_or(4))),
+    ("jacks", |size| spd::jacks(size.unwrap_or(3))),
+    ("lattice", |size| spd::lattice(size.unwrap_or(12))),
+    ("mount", |size| spd::mount(size.unwrap_or(6))),
+    ("rings", |size| spd::rings(size.unwrap_or(7))),
+    ("shells", |size| spd::shells(size.unwrap_or(5))),
+    ("sombrero", |size| spd::sombrero(size.unwrap_or(1))),
+    ("teapot", |size| spd::teapot(size.unwrap_or(12))),
     ("tetra", |size| spd::tetra(size.unwrap_or(6))),
+    ("tree", |size| spd::tree(size.unwrap_or(11))),
     ("stadium", |size| stadium::stadium(870.0, size.unwrap_or(12))),
     ("soup", |size| triangles("soup", size, |n| soup::uniform(n, 1))),
     ("clusters", |size| triangles("clusters", size, |n| soup::clusters(n, 1))),

@@ -1,5 +1,6 @@
 //! [`Solid`]: one shape of a mixed scene.
 
+use crate::{Facet, Tube};
 use core::ops::ControlFlow;
 use rt_accel::{Counts, Hit, Primitive, WorldBound};
 use rt_bounds::Aabb;
@@ -29,6 +30,10 @@ pub enum Solid {
     Sphere(Sphere),
     /// A planar polygon.
     Polygon(Polygon),
+    /// A triangle, perhaps with normals to shade with.
+    Facet(Facet),
+    /// A cylinder or cone without ends.
+    Tube(Tube),
 }
 
 impl From<Sphere> for Solid {
@@ -43,12 +48,26 @@ impl From<Polygon> for Solid {
     }
 }
 
+impl From<Facet> for Solid {
+    fn from(facet: Facet) -> Solid {
+        Solid::Facet(facet)
+    }
+}
+
+impl From<Tube> for Solid {
+    fn from(tube: Tube) -> Solid {
+        Solid::Tube(tube)
+    }
+}
+
 /// The same call on whichever shape is inside.
 macro_rules! each {
     ($solid:expr, $shape:ident => $call:expr) => {
         match $solid {
             Solid::Sphere($shape) => $call,
             Solid::Polygon($shape) => $call,
+            Solid::Facet($shape) => $call,
+            Solid::Tube($shape) => $call,
         }
     };
 }

@@ -28,7 +28,8 @@ use rt_geom::{Axis, Ray, Real};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygon {
-    triangles: Vec<Triangle>,
+    corners: Box<[DVec3]>,
+    triangles: Box<[Triangle]>,
     normal: DVec3,
 }
 
@@ -65,7 +66,12 @@ impl Polygon {
     pub fn new(corners: &[DVec3]) -> Result<Polygon, PolygonError> {
         let (cuts, normal) = cut(corners)?;
         let triangles = cuts.into_iter().map(|cut| Triangle { corners: cut.map(|i| corners[i]) }).collect();
-        Ok(Polygon { triangles, normal })
+        Ok(Polygon { corners: corners.into(), triangles, normal })
+    }
+
+    /// The corners, in the order given.
+    pub fn corners(&self) -> &[DVec3] {
+        &self.corners
     }
 
     /// The triangles `corners` is cut into, by corner numbers, turning the way the corners do: for meshes of polygons.
