@@ -21,8 +21,8 @@ use std::time::{Duration, Instant};
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// The scene: a name, or a file that ends in .obj.
-    #[arg(default_value = "balls", value_name = "SCENE|FILE.obj")]
+    /// The scene: a name, or a file that ends in .obj or .nff.
+    #[arg(default_value = "balls", value_name = "SCENE|FILE")]
     scene: String,
     /// The structure over the scene.
     #[arg(long, value_name = "STRUCTURE", default_value = DEFAULT_STRUCTURE)]

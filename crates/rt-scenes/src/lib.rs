@@ -21,10 +21,13 @@
 
 pub mod fine;
 pub mod hostile;
+pub mod interior;
+pub mod nff;
 pub mod obj;
 pub mod soup;
 pub mod spd;
 pub mod stadium;
+pub mod terrain;
 
 mod facet;
 mod numbers;
@@ -38,4 +41,4 @@ pub use facet::Facet;
 pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, by_name, names};
 pub use solid::Solid;
 pub use trial::{Closed, Trial, closed_meshes, fine_trials, trials};
-pub use tube::Tube;
+pub use tube::{Tube, TubeError};

@@ -1,6 +1,6 @@
 //! [`Scene`]: shapes, looks, lights, a view.
 
-use crate::{Solid, fine, soup, spd, stadium};
+use crate::{Solid, fine, interior, soup, spd, stadium, terrain};
 use core::fmt;
 use rt_accel::{Bounded, WorldBound};
 use rt_bounds::Aabb;
@@ -271,6 +271,8 @@ const SCENES: &[(&str, Maker)] = &[
     ("tetra", |size| spd::tetra(size.unwrap_or(6))),
     ("tree", |size| spd::tree(size.unwrap_or(11))),
     ("stadium", |size| stadium::stadium(870.0, size.unwrap_or(12))),
+    ("interior", |size| interior::interior(size.unwrap_or(4))),
+    ("terrain", |size| terrain::terrain(size.unwrap_or(708))),
     ("soup", |size| triangles("soup", size, |n| soup::uniform(n, 1))),
     ("clusters", |size| triangles("clusters", size, |n| soup::clusters(n, 1))),
     ("sticks", |size| triangles("sticks", size, |n| soup::sticks(n, 1e3, 1))),
@@ -356,7 +358,7 @@ mod tests {
         }
         let error = by_name("bunny", None).unwrap_err().to_string();
         assert!(
-            error.starts_with("there is no scene \"bunny\"; there are balls, tetra, stadium,"),
+            error.starts_with("there is no scene \"bunny\"; there are balls, gears, jacks,"),
             "{error}"
         );
     }

@@ -1,5 +1,6 @@
 //! [`Tube`]: an open cone or cylinder between two circles. SCAFFOLD.
 
+use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Hit, Primitive, WorldBound};
 use rt_bounds::Aabb;
@@ -14,10 +15,46 @@ pub struct Tube {
     radii: [f64; 2],
 }
 
+/// Why a tube is none.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum TubeError {
+    /// The middle of an end is not finite.
+    End(DVec3),
+    /// A radius is not finite, or negative, or both are zero.
+    Radius(f64),
+    /// Both ends are at one place.
+    NoAxis,
+}
+
+impl fmt::Display for TubeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TubeError::End(end) => write!(f, "the end {end} of a cylinder or cone is not finite"),
+            TubeError::Radius(r) => write!(f, "cylinders and cones have no radius {r}"),
+            TubeError::NoAxis => write!(f, "the ends of a cylinder or cone are at one place"),
+        }
+    }
+}
+
+impl core::error::Error for TubeError {}
+
 impl Tube {
     /// new
-    pub fn new(ends: [DVec3; 2], radii: [f64; 2]) -> Option<Tube> {
-        Some(Tube { ends, radii })
+    pub fn new(ends: [DVec3; 2], radii: [f64; 2]) -> Result<Tube, TubeError> {
+        if let Some(&end) = ends.iter().find(|end| !end.is_finite()) {
+            return Err(TubeError::End(end));
+        }
+        if let Some(&radius) = radii.iter().find(|r| !(**r >= 0.0 && r.is_finite())) {
+            return Err(TubeError::Radius(radius));
+        }
+        if radii == [0.0; 2] {
+            return Err(TubeError::Radius(0.0));
+        }
+        if ends[0] == ends[1] {
+            return Err(TubeError::NoAxis);
+        }
+        Ok(Tube { ends, radii })
     }
     /// The middles of the two circles.
     pub fn ends(&self) -> [DVec3; 2] {
