@@ -21,11 +21,13 @@
 //! ```
 
 mod aabb;
+mod quadric;
 mod rational;
 mod sphere;
 mod triangle;
 
 pub use aabb::{Span, aabb};
+pub use quadric::{frustum, quadratic, revolved};
 pub use rational::Rational;
 pub use sphere::sphere;
 pub use triangle::{Closest, Corners, Root, closest, crosses, crossings, triangle};

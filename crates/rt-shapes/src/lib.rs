@@ -36,12 +36,14 @@
 
 mod mesh;
 mod polygon;
+mod quadric;
 mod sphere;
 mod surface;
 mod triangle;
 
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
+pub use quadric::{Frustum, QuadricError, Root};
 pub use sphere::{Sphere, SphereError};
 pub use surface::{Partials, Shape, Surface, Surfaced, Uv};
 pub use triangle::{Meeting, Triangle, moller_trumbore};

@@ -2,7 +2,7 @@
 
 use super::parts;
 use core::cmp::Ordering;
-use core::ops::Sub;
+use core::ops::{Add, Mul, Sub};
 use num_bigint::{BigInt, Sign};
 use rt_geom::Real;
 
@@ -38,6 +38,29 @@ impl Rational {
     pub fn from_f64(x: f64) -> Option<Rational> {
         let (mantissa, exp) = parts(x);
         x.is_finite().then(|| Rational { num: mantissa.into(), den: 1.into(), exp })
+    }
+
+    /// -1, 0 or 1.
+    pub fn sign(&self) -> i32 {
+        match self.num.sign() {
+            Sign::Minus => -1,
+            Sign::NoSign => 0,
+            Sign::Plus => 1,
+        }
+    }
+
+    /// The square root, rounded down to `digits` binary digits or more; exact where the number is a square of a quotient of such
+    /// length. `None` below zero.
+    pub fn sqrt(&self, digits: u64) -> Option<Rational> {
+        if self.num.sign() == Sign::Minus {
+            return None;
+        }
+        // sqrt(n / d) = sqrt(n d) / d, in an even power of two.
+        let odd = self.exp.rem_euclid(2);
+        let radicand = (&self.num * &self.den) << odd;
+        let more = digits.saturating_sub(radicand.bits() / 2) as i64;
+        let root = (radicand << (2 * more)).sqrt();
+        Some(Rational { num: root, den: self.den.clone(), exp: (self.exp - odd) / 2 - more })
     }
 
     /// The nearest `f64`, ties to even; infinite beyond the range.
@@ -142,6 +165,21 @@ impl Sub for &Rational {
     }
 }
 
+impl Add for &Rational {
+    type Output = Rational;
+    fn add(self, other: &Rational) -> Rational {
+        let (a, b, exp) = common(self, other);
+        Rational { num: a + b, den: &self.den * &other.den, exp }
+    }
+}
+
+impl Mul for &Rational {
+    type Output = Rational;
+    fn mul(self, other: &Rational) -> Rational {
+        Rational { num: &self.num * &other.num, den: &self.den * &other.den, exp: self.exp + other.exp }
+    }
+}
+
 impl core::ops::Div for &Rational {
     type Output = Rational;
     /// # Panics
@@ -169,6 +207,8 @@ mod tests {
             prop_assert_eq!(x.to_f64(), a);
             prop_assert_eq!(x.to_f32(), a as f32);
             prop_assert_eq!((&x - &y).to_f64(), a - b);
+            prop_assert_eq!((&x + &y).to_f64(), a + b);
+            prop_assert_eq!((&x * &y).to_f64(), a * b);
             prop_assert_eq!(x.partial_cmp(&y), a.partial_cmp(&b));
             prop_assert_eq!(x.compare(b), a.partial_cmp(&b));
             if b != 0.0 {

@@ -1,0 +1,386 @@
+//! Where a line meets a [`Form`]: first in `f64` with bounds, then with twice the digits where the bounds leave something open.
+
+use super::Root;
+use super::form::{Coefficients, Extent, Form, Number, offset, signed, size, uncertain};
+use core::ops::ControlFlow;
+use rt_geom::expansion::DoubleDouble;
+use rt_geom::glam::{DVec2, DVec3};
+use rt_geom::{Ray, Real, Vector};
+
+const U: f64 = f64::EPSILON / 2.0;
+/// A discriminant this much larger than its error gives roots that Newton's steps converge from: to all digits in three.
+const CLEAR: f64 = 4096.0;
+
+/// Whether products of four such factors stay in range; false for NaN.
+#[inline(always)]
+fn moderate(x: f64) -> bool {
+    x > 1e-60 && x < 1e60
+}
+
+/// A root as first found, off by no more than `slack`; `fine` if more digits would not help.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    t: f64,
+    slack: f64,
+    fine: bool,
+}
+
+/// Each hit of the ray on the surface, nearest first.
+#[inline]
+pub(super) fn hits<F: Form, R: Real>(
+    form: &F,
+    ray: &Ray<R>,
+    mut each: impl FnMut(R) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    let (o, d) = (ray.origin.widen(), ray.dir.widen());
+    let extent = form.extent();
+    let (reach, speed) = ((o - extent.anchor).abs().max_element().max(extent.radius), d.abs().max_element());
+    if !(moderate(reach) && moderate(extent.radius) && moderate(speed)) {
+        for root in roots_scaled(form, o, d).into_iter().flatten() {
+            if let Some(t) = ray.admit(root.t) {
+                each(t)?;
+            }
+        }
+        return ControlFlow::Continue(());
+    }
+    let Some(found) = candidates(form, o, d) else { return ControlFlow::Continue(()) };
+    let mut last = f64::NEG_INFINITY;
+    for candidate in found.into_iter().flatten() {
+        // In order, whatever the digits of either; and two that cannot be told apart are one.
+        if let Some(root) = settle::<F, R>(form, o, d, candidate, ray.t_min.into(), ray.t_max.reach())
+            && root.t > last
+        {
+            last = root.t;
+            if let Some(t) = ray.admit(root.t) {
+                each(t)?;
+            }
+        }
+    }
+    ControlFlow::Continue(())
+}
+
+/// Both roots on the surface, whatever their sign, with their errors.
+pub(super) fn roots<F: Form>(form: &F, o: DVec3, d: DVec3) -> [Option<Root>; 2] {
+    let extent = form.extent();
+    let (reach, speed) = ((o - extent.anchor).abs().max_element().max(extent.radius), d.abs().max_element());
+    if moderate(reach) && moderate(extent.radius) && moderate(speed) {
+        return roots_in_range(form, o, d);
+    }
+    roots_scaled(form, o, d)
+}
+
+fn roots_in_range<F: Form>(form: &F, o: DVec3, d: DVec3) -> [Option<Root>; 2] {
+    let all = f64::INFINITY;
+    let found = candidates(form, o, d).unwrap_or_default();
+    let [near, far] = found.map(|c| settle::<F, f64>(form, o, d, c?, -all, all));
+    if near.map(|root| root.t) == far.map(|root| root.t) { [near, None] } else { [near, far] }
+}
+
+/// [`roots`] for sizes whose products leave the range of `f64`: the same surface and line, in other units.
+#[cold]
+fn roots_scaled<F: Form>(form: &F, o: DVec3, d: DVec3) -> [Option<Root>; 2] {
+    let extent = form.extent();
+    let size = (o - extent.anchor).abs().max_element().max(extent.radius);
+    let speed = d.abs().max_element();
+    if !(size.is_finite() && o.is_finite() && d.is_finite()) || speed == 0.0 {
+        return [None; 2];
+    }
+    let power = |x: f64| f64::from_bits((x.to_bits() >> 52).clamp(30, 2000) << 52);
+    let (unit, pace) = (power(size), power(speed));
+    // In the order that stays in range.
+    let back = |t: f64| if (t * unit).is_finite() { t * unit / pace } else { t / pace * unit };
+    roots_in_range(&form.scaled(1.0 / unit), o / unit, d / pace)
+        .map(|root| root.map(|root| Root { t: back(root.t), error: back(root.error) }))
+}
+
+/// The roots near enough to the surface, lesser first.
+#[inline(always)]
+fn candidates<F: Form>(form: &F, o: DVec3, d: DVec3) -> Option<[Option<Candidate>; 2]> {
+    let extent = form.extent();
+    // From here on distances count from the point of the line nearest to the middle: what lies far away does not cancel.
+    let l = o - extent.anchor - extent.middle;
+    let speed = d.dot(d);
+    let t = -l.dot(d) / speed;
+    let reach = reach(extent, o, d, t);
+    let p = l + d * t;
+    if p.dot(p) > reach * reach {
+        return None;
+    }
+    let span = 2.0 * reach / speed.sqrt();
+    let k = Coefficients::<f64>::new(form, o, d, t);
+    let (a, b, c, off) = (k.a, k.b, k.c, k.off);
+    let discriminant = b * b - a * c;
+    let doubt = doubt::<f64>(a, b, c, off);
+    if discriminant < -doubt {
+        return None;
+    }
+    let root = discriminant.sqrt();
+    let q = if b < 0.0 { root - b } else { -b - root };
+    // The root at q / a may be so far away that the error of a does not matter.
+    let away = q.abs() > span * (a.abs() + off[0]);
+    if discriminant > CLEAR * doubt && (away || a.abs() > CLEAR * off[0]) {
+        let candidate = |s: f64| Candidate {
+            t: t + s,
+            slack: (off[2] + 2.0 * s.abs() * off[1] + s * s * off[0]) / root + 2.0 * U * (t.abs() + s.abs()),
+            fine: false,
+        };
+        let first = candidate(c / q);
+        if away {
+            return Some([Some(first), None]);
+        }
+        let second = candidate(q / a);
+        let both = if first.t <= second.t { [first, second] } else { [second, first] };
+        return Some(both.map(Some));
+    }
+    candidates_wide(form, o, d, t, span)
+}
+
+/// How far from the middle a point of the line may lie that is on the surface.
+#[inline(always)]
+fn reach(extent: &Extent, o: DVec3, d: DVec3, t: f64) -> f64 {
+    let off = super::form::spread::<f64>(extent.anchor, o, d, t) + U * extent.middle.abs().max_element();
+    (extent.radius + 8.0 * off) * (1.0 + 16.0 * U)
+}
+
+/// Bound on the error of `b b - a c`.
+#[inline(always)]
+fn doubt<T: Number>(a: f64, b: f64, c: f64, off: [f64; 3]) -> f64 {
+    2.0 * b.abs() * off[1]
+        + off[1] * off[1]
+        + a.abs() * off[2]
+        + c.abs() * off[0]
+        + off[0] * off[2]
+        + 4.0 * T::U * (b * b + (a * c).abs())
+}
+
+/// The same with twice the digits, for lines so close to tangent, or so long beside what they meet, that `f64` leaves the
+/// decision open. What even these digits leave open is taken for a tangent: a hit.
+#[cold]
+#[inline(never)]
+fn candidates_wide<F: Form>(
+    form: &F,
+    o: DVec3,
+    d: DVec3,
+    mut t: f64,
+    span: f64,
+) -> Option<[Option<Candidate>; 2]> {
+    // Once more nearer: to the middle between the roots, where the linear term vanishes.
+    for _ in 0..2 {
+        let k = Coefficients::<DoubleDouble>::new(form, o, d, t);
+        let shift = -k.b.value() / k.a.value();
+        if shift.abs() <= span {
+            t += shift;
+        }
+    }
+    let k = Coefficients::<DoubleDouble>::new(form, o, d, t);
+    let (a, b, c, off) = (k.a.value(), k.b.value(), k.c.value(), k.off);
+    let discriminant = k.b * k.b - k.a * k.c;
+    let doubt = doubt::<DoubleDouble>(a, b, c, off);
+    if discriminant.value() < -doubt || discriminant.value().is_nan() {
+        return None;
+    }
+    let zero = DoubleDouble::from(0.0);
+    let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { zero };
+    let q = if b < 0.0 { root - k.b } else { zero - k.b - root };
+    // By how much the root of the discriminant may be off.
+    let blur = if root.value() > 0.0 { (doubt / root.value()).min(doubt.sqrt()) } else { doubt.sqrt() };
+    let candidate = |s: DoubleDouble| {
+        let (at, s) = ((DoubleDouble::from(t) + s).value(), s.value());
+        let by_slope = (off[2] + 2.0 * s.abs() * off[1] + s * s * off[0]) / root.value();
+        let by_half = (blur + off[1] + s.abs() * off[0]) / a.abs();
+        // Either may be NaN, where the other is not.
+        let own = if root.value() * root.value() > 4.0 * doubt { by_slope.min(by_half) } else { by_half };
+        Candidate { t: at, slack: 2.0 * own + U * at.abs(), fine: true }
+    };
+    let near = |c: &Candidate| (c.t - t).abs() <= 2.0 * span + c.slack;
+    if q.value() == 0.0 {
+        // All of the line lies in the surface, which it then does not cross; or it touches.
+        return (a.abs() > off[0]).then(|| [Some(candidate(zero)), None]);
+    }
+    let second = if a.abs() > off[0] { Some(candidate(q / k.a)).filter(near) } else { None };
+    let first = Some(candidate(k.c / q)).filter(near);
+    Some(match (first, second) {
+        (Some(x), Some(y)) if y.t < x.t => [Some(y), Some(x)],
+        (None, y) => [y, None],
+        both => [both.0, both.1],
+    })
+}
+
+/// Newton's steps on `f` evaluated with twice the digits, until they no longer matter.
+///
+/// On a quadratic, `e` away from a root, a step `f / f'` leaves `a e^2 / f'`; and `e` is at most two steps while
+/// `4 |a f| <= f'^2`. So each step tells what error it leaves.
+#[inline(never)]
+fn polish<F: Form>(form: &F, o: DVec3, d: DVec3, mut t: f64) -> Option<Root> {
+    let anchor = form.extent().anchor;
+    let (signs, slope) = (form.signs(), form.slope());
+    let v = form.linear::<DoubleDouble>(d.to_array().map(DoubleDouble::from));
+    let fast = v.squares.map(DoubleDouble::value);
+    let a = signed(signs, &fast, &fast);
+    for round in 0..6 {
+        let w = offset::<DoubleDouble>(anchor, o, d, t);
+        let u = form.at(w);
+        let f = (signed(signs, &u.squares, &u.squares) - slope * u.axial).value();
+        let derivative =
+            2.0 * signed(signs, &u.squares.map(DoubleDouble::value), &fast) - slope.value() * v.axial.value();
+        let (eta, _) = uncertain::<DoubleDouble, F>(form, &w, o, d, t);
+        let (us, vs) = (size(&u), fast.iter().map(|x| x.abs()).sum::<f64>());
+        let off = 3.0 * us * eta + 4.0 * eta * eta + 2.0 * slope.value().abs() * eta;
+        let tilt = 16.0 * U * (us * vs + slope.value().abs() * v.axial.value().abs());
+        let step = f / derivative;
+        if !(4.0 * (a * f).abs() <= derivative * derivative && derivative.abs() > 2.0 * tilt) {
+            return None;
+        }
+        let next = (DoubleDouble::from(t) - step.into()).value();
+        let floor = 2.0 * off / derivative.abs();
+        let left = (4.0 * a.abs() * step * step + 2.0 * tilt * step.abs()) / derivative.abs() + floor;
+        t = next;
+        if left <= 0.125 * U * t.abs() || (left <= 2.0 * floor && round > 0) || round == 5 {
+            return Some(Root { t, error: 2.0 * left + U * t.abs() });
+        }
+    }
+    None
+}
+
+/// Whether a root lies within the limits of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Verdict {
+    Inside,
+    Outside,
+    /// It may: and it does when `t` is moved by so much, which is within its error.
+    Unsure(f64),
+}
+
+/// What is left of the error of a root once it keeps to the limits, as far as these are open.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    from: f64,
+    to: f64,
+    error: f64,
+    unsure: bool,
+}
+
+impl Window {
+    /// Whether `value`, known up to `off` and linear along the line, may be at least 0 at the root.
+    #[inline(always)]
+    fn admits(&mut self, value: f64, off: f64, slope: f64) -> bool {
+        let play = slope.abs() * self.error + off;
+        if value >= play {
+            return true;
+        }
+        if value < -play {
+            return false;
+        }
+        self.unsure = true;
+        let zero = (-value / slope).max(self.from).min(self.to);
+        if slope > 0.0 {
+            self.from = zero;
+        } else if slope < 0.0 {
+            self.to = zero;
+        }
+        true
+    }
+}
+
+/// Decides about the root at `t`, off by no more than `error`, by signs.
+#[inline(always)]
+fn verdict<F: Form, T: Number>(form: &F, o: DVec3, d: DVec3, t: f64, error: f64) -> Verdict {
+    let extent = form.extent();
+    let w = offset::<T>(extent.anchor, o, d, t);
+    let (u, v) = (form.linear(w), form.linear::<T>(d.to_array().map(T::from)));
+    let (eta, _) = uncertain::<T, F>(form, &w, o, d, t);
+    let mut window = Window { from: -error, to: error, error, unsure: false };
+    let limits = extent.limits.map(T::wide);
+    let rounded = |x: T| eta + 4.0 * T::U * x.value().abs();
+    let axial = v.axial.value();
+    if !window.admits((u.axial - limits[0]).value(), rounded(limits[0]), axial)
+        || !window.admits((limits[1] - u.axial).value(), rounded(limits[1]), -axial)
+    {
+        return Verdict::Outside;
+    }
+    if let Some(sweep) = form.sweep() {
+        let cross = |e: DVec2, p: &[T; 4]| (T::from(e.x) * p[1] - T::from(e.y) * p[0]).value();
+        let side = |window: &mut Window, e: DVec2, sign: f64| {
+            window.admits(sign * cross(e, &u.squares), 4.0 * eta, sign * cross(e, &v.squares))
+        };
+        let [from, to] = sweep.ends;
+        if sweep.reflex {
+            let (mut one, mut other) = (window, window);
+            let (a, b) = (side(&mut one, from, 1.0), side(&mut other, to, -1.0));
+            // Prefer the half plane that leaves less open.
+            window = match (a, b) {
+                (false, false) => return Verdict::Outside,
+                (true, false) => one,
+                (false, true) => other,
+                (true, true) if one.unsure => other,
+                (true, true) => one,
+            };
+        } else if !side(&mut window, from, 1.0) || !side(&mut window, to, -1.0) {
+            return Verdict::Outside;
+        }
+    }
+    if window.unsure { Verdict::Unsure(0.0f64.max(window.from).min(window.to)) } else { Verdict::Inside }
+}
+
+/// The root near a candidate, if it lies on the surface and its error leaves it the chance to lie between `t_min` and `t_max`.
+///
+/// It has the digits that `R` asks for, and those that the limits ask for: which depends on the line alone, so that every
+/// interval sees the same root.
+#[inline(always)]
+fn settle<F: Form, R: Real>(
+    form: &F,
+    o: DVec3,
+    d: DVec3,
+    candidate: Candidate,
+    t_min: f64,
+    t_max: f64,
+) -> Option<Root> {
+    let Candidate { t, slack, fine } = candidate;
+    if !(t + slack >= t_min && t - slack <= t_max) {
+        return None;
+    }
+    let rough = verdict::<F, f64>(form, o, d, t, slack);
+    if rough == Verdict::Outside {
+        return None;
+    }
+    if rough == Verdict::Inside && slack <= R::ROOT_ERROR * t.abs() {
+        // Only the near end of the interval may need more digits, and then for the decision only.
+        if (t - t_min).abs() > slack || fine {
+            return Some(Root { t: near_end(t, slack, t_min), error: slack });
+        }
+        let root = polish(form, o, d, t).unwrap_or(Root { t, error: slack });
+        return (near_end(root.t, root.error, t_min) >= t_min)
+            .then(|| Root { t: t.max(t_min), error: slack });
+    }
+    let mut root = match polish(form, o, d, t) {
+        Some(root) if !fine || root.error < slack => root,
+        _ if fine => Root { t, error: slack },
+        _ => closest_wide(form, o, d, t, slack),
+    };
+    if rough != Verdict::Inside || root.error > slack {
+        match verdict::<F, DoubleDouble>(form, o, d, root.t, root.error) {
+            Verdict::Inside => {}
+            Verdict::Outside => return None,
+            Verdict::Unsure(shift) => {
+                root.t += shift;
+                root.error += shift.abs();
+            }
+        }
+    }
+    Some(Root { t: near_end(root.t, root.error, t_min), ..root })
+}
+
+/// A root that may lie at the near end of the interval does.
+#[inline(always)]
+fn near_end(t: f64, error: f64, t_min: f64) -> f64 {
+    if t < t_min && t + error >= t_min { t_min } else { t }
+}
+
+/// The root from twice the digits that is nearest to `t`, where steps do not converge.
+#[cold]
+fn closest_wide<F: Form>(form: &F, o: DVec3, d: DVec3, t: f64, slack: f64) -> Root {
+    let span = 2.0 * form.extent().radius / d.length();
+    let found = candidates_wide(form, o, d, t, span).unwrap_or_default().into_iter().flatten();
+    let nearest = found.min_by(|x, y| (x.t - t).abs().total_cmp(&(y.t - t).abs()));
+    nearest.map_or(Root { t, error: slack }, |c| Root { t: c.t, error: c.slack })
+}
