@@ -56,7 +56,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     catch_interrupts();
     say!("{:14}{:>12}{}", "scene", "primitives", COLUMNS.map(|what| format!("{what:>13}")).concat());
     let mut wrong = Vec::new();
-    for known in KNOWN.iter().filter(|known| args.scenes.is_empty() || args.scenes.iter().any(|s| s == known.scene)) {
+    for known in
+        KNOWN.iter().filter(|known| args.scenes.is_empty() || args.scenes.iter().any(|s| s == known.scene))
+    {
         let name = format!("{} {}", known.scene, known.size);
         let scene = load(known.scene, Some(known.size))?;
         let primitives = scene.prim_count();
@@ -83,7 +85,11 @@ fn share(counted: u64, known: u64) -> f64 {
 }
 
 fn percents(counted: &[u64], known: &[u64]) -> String {
-    counted.iter().zip(known).map(|(&counted, &known)| format!("{:>13.3}", 100.0 * share(counted, known))).collect()
+    counted
+        .iter()
+        .zip(known)
+        .map(|(&counted, &known)| format!("{:>13.3}", 100.0 * share(counted, known)))
+        .collect()
 }
 
 fn off(counts: &[u64; 7], known: &Known) -> bool {
@@ -106,7 +112,16 @@ fn count<R: Precision>(args: &Args, mut scene: Scene) -> Result<[u64; 7], Failur
         Stage::Solids(shape) => shoot(args, &scene, &*shape, |at: &Member<Uv>| material(at.prim)),
         Stage::Mesh(shape) => shoot(args, &scene, &*shape, |at: &Uv| material(at.prim)),
     }?;
-    let RayCounts { eye: _, eye_hits, reflection, refraction, secondary_hits, shadow, occluded, total_internal } = rays;
+    let RayCounts {
+        eye: _,
+        eye_hits,
+        reflection,
+        refraction,
+        secondary_hits,
+        shadow,
+        occluded,
+        total_internal,
+    } = rays;
     Ok([eye_hits, reflection, refraction, shadow, occluded, secondary_hits, total_internal])
 }
 

@@ -43,8 +43,10 @@ pub(crate) fn load(name: &str, size: Option<u32>) -> Result<Scene, Failure> {
         };
     }
     if name.contains(['/', '\\', '.']) {
-        let why =
-            format!("{name}: only .obj and .nff files can be read; scenes are {}", rt_scenes::names().join(", "));
+        let why = format!(
+            "{name}: only .obj and .nff files can be read; scenes are {}",
+            rt_scenes::names().join(", ")
+        );
         return Err(Failure::Usage(why));
     }
     rt_scenes::by_name(name, size).map_err(|e| Failure::Usage(e.to_string()))

@@ -209,7 +209,16 @@ impl Site {
     }
 
     fn leg(&mut self, foot: DVec3, height: f64, thick: f64) {
-        let shape = [(0.6, 0.0), (0.8, 0.04), (0.5, 0.08), (0.7, 0.3), (1.0, 0.55), (0.8, 0.75), (0.6, 0.8), (1.0, 0.86)];
+        let shape = [
+            (0.6, 0.0),
+            (0.8, 0.04),
+            (0.5, 0.08),
+            (0.7, 0.3),
+            (1.0, 0.55),
+            (0.8, 0.75),
+            (0.6, 0.8),
+            (1.0, 0.86),
+        ];
         let mut profile: Vec<(f64, f64)> = shape.map(|(r, z)| (r * thick, z * height)).to_vec();
         profile.push((thick, height));
         self.turned(foot, &profile, 12, WOOD);
@@ -230,7 +239,8 @@ impl Site {
             let out = 1.35 + 0.2 * self.random.signed();
             self.chair(middle + away * out, DVec3::new(cos, sin, 0.0));
         }
-        let vase = [(0.0, 0.0), (0.08, 0.0), (0.13, 0.08), (0.12, 0.16), (0.05, 0.24), (0.05, 0.28), (0.08, 0.32)];
+        let vase =
+            [(0.0, 0.0), (0.08, 0.0), (0.13, 0.08), (0.12, 0.16), (0.05, 0.24), (0.05, 0.28), (0.08, 0.32)];
         self.turned(middle + DVec3::Z * 0.765, &vase, 32, BOOK + 2);
     }
 

@@ -35,10 +35,8 @@ mod scene;
 mod solid;
 mod teapot;
 mod trial;
-mod tube;
 
 pub use facet::Facet;
 pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, by_name, names};
 pub use solid::Solid;
 pub use trial::{Closed, Trial, closed_meshes, fine_trials, trials};
-pub use tube::{Tube, TubeError};

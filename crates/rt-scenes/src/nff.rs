@@ -5,7 +5,7 @@
 //! | `v` with `from`, `at`, `up`, `angle` | the [view](crate::View); without one, a view of the whole box |
 //! | `hither`, `resolution` | passed over; written as 0 and 512 |
 //! | `b`, `l` with or without a colour, `f` | background, lights, materials; lights without a colour [share](Light::shared) |
-//! | `c` | a [`Tube`] |
+//! | `c` | a [frustum](rt_shapes::Frustum), open at both ends |
 //! | `s` | a sphere; of a negative radius, with a warning, as one of a positive radius: surfaces have two sides here |
 //! | `p` and `pp` of three corners | a triangle |
 //! | `p` of more corners | a polygon |
@@ -40,12 +40,12 @@
 mod words;
 mod write;
 
-use crate::{Facet, Light, Material, Scene, SceneGeometry, Solid, Tube, TubeError, View, numbers, scene};
+use crate::{Facet, Light, Material, Scene, SceneGeometry, Solid, View, numbers, scene};
 use core::fmt;
-use rt_bounds::Aabb;
 use rt_accel::WorldBound;
+use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
-use rt_shapes::{Polygon, Sphere, SphereError};
+use rt_shapes::{Frustum, Polygon, QuadricError, Sphere, SphereError};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use words::{Place, Words};
@@ -102,7 +102,7 @@ pub enum NffProblem {
     /// A sphere that is none.
     Sphere(SphereError),
     /// A cylinder or cone that is none.
-    Tube(TubeError),
+    Frustum(QuadricError),
     /// More triangles than can be numbered.
     TooManyTriangles,
 }
@@ -136,7 +136,7 @@ impl fmt::Display for NffProblem {
             }
             NffProblem::Ends { what } => write!(f, "the file ends before {what}"),
             NffProblem::Sphere(error) => error.fmt(f),
-            NffProblem::Tube(error) => error.fmt(f),
+            NffProblem::Frustum(error) => error.fmt(f),
             NffProblem::TooManyTriangles => write!(f, "more triangles than can be numbered"),
         }
     }
@@ -226,9 +226,8 @@ impl Reader {
                 "c" => {
                     let ((base, wide), (apex, narrow)) = (circle(words)?, circle(words)?);
                     self.inward += usize::from(wide < 0.0 || narrow < 0.0);
-                    let tube = Tube::new([base, apex], [wide.abs(), narrow.abs()]);
-                    let tube = tube.map_err(NffProblem::Tube)?;
-                    self.solid(tube);
+                    let frustum = Frustum::new(base, wide.abs(), apex, narrow.abs());
+                    self.solid(frustum.map_err(NffProblem::Frustum)?);
                 }
                 "p" => {
                     let corners = corners(words, |words| words.place("a corner"))?;
@@ -390,10 +389,11 @@ impl Reader {
         };
         let n = self.lights.len();
         let shared = Light::shared(&vec![[0.0; 3]; n]);
-        let lights = self.lights.iter().zip(shared).map(|(&(position, color), shared)| Light {
-            position,
-            color: color.unwrap_or(shared.color),
-        });
+        let lights = self
+            .lights
+            .iter()
+            .zip(shared)
+            .map(|(&(position, color), shared)| Light { position, color: color.unwrap_or(shared.color) });
         let view = self.view.unwrap_or_else(|| {
             warnings.push("there is no view; it is seen whole, from above".to_string());
             View::framing(&match &geometry {

@@ -357,10 +357,7 @@ mod tests {
             assert!(by_name(name, Some(u32::MAX)).is_err(), "{name}");
         }
         let error = by_name("bunny", None).unwrap_err().to_string();
-        assert!(
-            error.starts_with("there is no scene \"bunny\"; there are balls, gears, jacks,"),
-            "{error}"
-        );
+        assert!(error.starts_with("there is no scene \"bunny\"; there are balls, gears, jacks,"), "{error}");
     }
 
     #[test]

@@ -1,16 +1,16 @@
 //! [`Solid`]: one shape of a mixed scene.
 
-use crate::{Facet, Tube};
+use crate::Facet;
 use core::ops::ControlFlow;
 use rt_accel::{Counts, Hit, Primitive, WorldBound};
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
-use rt_shapes::{Partials, Polygon, Shape, Sphere, Surface, Uv};
+use rt_shapes::{Frustum, Partials, Polygon, Shape, Sphere, Surface, Uv};
 
 /// One solid of a mixed scene: answers as the shape inside does, rays of both precisions.
 ///
-/// A closed set of shapes, so that a list of them is flat in memory and no call is virtual.
+/// A closed set of shapes, 64 bytes each and what they refer to, so that no call is virtual.
 ///
 /// ```
 /// use rt_accel::{Aggregate, Exhaustive, Primitive};
@@ -32,8 +32,8 @@ pub enum Solid {
     Polygon(Polygon),
     /// A triangle, perhaps with normals to shade with.
     Facet(Facet),
-    /// A cylinder or cone without ends.
-    Tube(Tube),
+    /// A cylinder or cone without ends; elsewhere, because it is several times as large as the others.
+    Frustum(Box<Frustum>),
 }
 
 impl From<Sphere> for Solid {
@@ -54,9 +54,9 @@ impl From<Facet> for Solid {
     }
 }
 
-impl From<Tube> for Solid {
-    fn from(tube: Tube) -> Solid {
-        Solid::Tube(tube)
+impl From<Frustum> for Solid {
+    fn from(frustum: Frustum) -> Solid {
+        Solid::Frustum(Box::new(frustum))
     }
 }
 
@@ -67,7 +67,7 @@ macro_rules! each {
             Solid::Sphere($shape) => $call,
             Solid::Polygon($shape) => $call,
             Solid::Facet($shape) => $call,
-            Solid::Tube($shape) => $call,
+            Solid::Frustum($shape) => $call,
         }
     };
 }

@@ -31,9 +31,9 @@ pub use teapot::teapot;
 pub use tetra::tetra;
 pub use tree::tree;
 
-use crate::{Light, Material, Scene, SceneGeometry, Solid, Tube, View};
+use crate::{Light, Material, Scene, SceneGeometry, Solid, View};
 use rt_geom::glam::DVec3;
-use rt_shapes::{Polygon, Sphere};
+use rt_shapes::{Frustum, Polygon, Sphere};
 
 /// The sky of most SPD scenes.
 pub(crate) const SKY: [f32; 3] = [0.078, 0.361, 0.753];
@@ -122,8 +122,8 @@ impl Pile {
         self.push(Polygon::new(corners).expect("a generator's polygon"), material);
     }
 
-    fn tube(&mut self, ends: [DVec3; 2], radii: [f64; 2], material: u32) {
-        self.push(Tube::new(ends, radii).expect("a generator's tube"), material);
+    fn frustum(&mut self, [base, top]: [DVec3; 2], [r0, r1]: [f64; 2], material: u32) {
+        self.push(Frustum::new(base, r0, top, r1).expect("a generator's frustum"), material);
     }
 
     /// The scene, without lights and not looked at.
@@ -151,7 +151,11 @@ mod tests {
         for known in KNOWN {
             let scene = by_name(known.scene, Some(known.size)).unwrap();
             assert_eq!(scene.prim_count(), known.primitives, "{} {}", known.scene, known.size);
-            assert!(known.scene == "tetra" || known.scene == "sombrero" || scene.material_of.len() == known.primitives);
+            assert!(
+                known.scene == "tetra"
+                    || known.scene == "sombrero"
+                    || scene.material_of.len() == known.primitives
+            );
             assert!(scene.material_of.iter().all(|&m| (m as usize) < scene.materials.len()));
         }
     }

@@ -44,11 +44,13 @@ fn grid(n: u32, value: impl Fn(&[DVec3; 16], f64, f64) -> DVec3) -> (Vec<DVec3>,
             row.iter().all(|p| *p == row[0])
         };
         let first = values.len() as u32;
-        values.extend((0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))).map(|(i, j)| value(&net, at(i), at(j))));
+        values.extend(
+            (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))).map(|(i, j)| value(&net, at(i), at(j))),
+        );
         for i in 0..n {
             for j in 0..n {
-                let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
-                    .map(|(i, j)| first + i * (n + 1) + j);
+                let [a, b, c, d] =
+                    [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| first + i * (n + 1) + j);
                 if !(i + 1 == n && tip(1)) {
                     triangles.push([a, c, b]);
                 }

@@ -61,7 +61,12 @@ pub fn terrain(size: u32) -> Result<Scene, SceneError> {
     Ok(Scene {
         name: "terrain".to_string(),
         geometry: SceneGeometry::Mesh(mesh(vertices, triangles)),
-        materials: vec![water, diffuse([0.3, 0.45, 0.15]), diffuse([0.5, 0.45, 0.4]), diffuse([0.95, 0.95, 1.0])],
+        materials: vec![
+            water,
+            diffuse([0.3, 0.45, 0.15]),
+            diffuse([0.5, 0.45, 0.4]),
+            diffuse([0.95, 0.95, 1.0]),
+        ],
         material_of,
         lights: Light::shared(&[[-60.0, -30.0, 50.0]]),
         view: View {

@@ -17,7 +17,11 @@ fn facets(geometry: &SceneGeometry) -> Vec<Solid> {
         SceneGeometry::Mesh(mesh) => {
             let wide = mesh.vertices().iter().map(|v| v.map(f64::from)).collect();
             let wide = numbers::mesh(wide, mesh.triangles().to_vec());
-            all(if mesh.normals().is_empty() { wide } else { wide.with_normals(mesh.normals().to_vec()).unwrap() })
+            all(if mesh.normals().is_empty() {
+                wide
+            } else {
+                wide.with_normals(mesh.normals().to_vec()).unwrap()
+            })
         }
     }
 }

@@ -41,9 +41,9 @@ pub fn write(scene: &Scene, to: &mut impl Write) -> io::Result<()> {
                     Solid::Facet(facet) => {
                         corners(&facet.corners(), facet.normals().as_ref().map(|n| &n[..]), to)?;
                     }
-                    Solid::Tube(tube) => {
+                    Solid::Frustum(frustum) => {
                         writeln!(to, "c")?;
-                        for (end, radius) in tube.ends().iter().zip(tube.radii()) {
+                        for (end, radius) in frustum.ends().iter().zip(frustum.radii()) {
                             writeln!(to, "{} {radius}", Three(end.to_array()))?;
                         }
                     }

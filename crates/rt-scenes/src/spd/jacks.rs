@@ -37,7 +37,7 @@ pub fn jacks(size: u32) -> Result<Scene, SceneError> {
 fn jack(pile: &mut Pile, turned: DMat3, middle: DVec3, size: f64, depth: u32) {
     let axes = [turned.x_axis, turned.y_axis, turned.z_axis].map(|axis| axis * (0.75 * size));
     for arm in axes {
-        pile.tube([middle - arm, middle + arm], [0.075 * size; 2], 0);
+        pile.frustum([middle - arm, middle + arm], [0.075 * size; 2], 0);
     }
     for arm in axes {
         pile.sphere(middle - arm, 0.15 * size, 1);

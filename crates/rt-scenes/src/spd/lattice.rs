@@ -30,7 +30,11 @@ pub fn lattice(size: u32) -> Result<Scene, SceneError> {
                 pile.sphere(at, radius, 0);
                 for (i, axis, material) in [(x, DVec3::X, 1), (y, DVec3::Y, 2), (z, DVec3::Z, 3)] {
                     if i < n {
-                        pile.tube([at + axis * hidden, at + axis * (cell - hidden)], [cell / 16.0; 2], material);
+                        pile.frustum(
+                            [at + axis * hidden, at + axis * (cell - hidden)],
+                            [cell / 16.0; 2],
+                            material,
+                        );
                     }
                 }
             }
@@ -49,6 +53,9 @@ pub fn lattice(size: u32) -> Result<Scene, SceneError> {
         lights: Light::shared(&lights),
         view: view([beside, 1.0, 1.0 - below], [beside, -1.0, -1.0 - below], [0.2, 1.0, 0.0], 60.0),
         background: SKY,
-        ..pile.scene("lattice", vec![ball, stick([1.0, 0.0, 0.0]), stick([0.0, 1.0, 0.0]), stick([0.0, 0.0, 1.0])])
+        ..pile.scene(
+            "lattice",
+            vec![ball, stick([1.0, 0.0, 0.0]), stick([0.0, 1.0, 0.0]), stick([0.0, 0.0, 1.0])],
+        )
     })
 }

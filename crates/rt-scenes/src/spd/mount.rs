@@ -41,8 +41,7 @@ pub fn mount(size: u32) -> Result<Scene, SceneError> {
         pile.sphere(middle + DVec3::Z * down + (toward * cos + across * sin) * side, 0.17, 1);
     }
     let rock = Material { color: [0.5, 0.45, 0.35], ..Material::default() };
-    let glass =
-        Material { color: [1.0; 3], kd: 0.1, ks: 0.1, shine: 3.0827, transmittance: 0.9, ior: 1.5 };
+    let glass = Material { color: [1.0; 3], kd: 0.1, ks: 0.1, shine: 3.0827, transmittance: 0.9, ior: 1.5 };
     Ok(Scene {
         lights: Light::shared(&[[-100.0, -100.0, 100.0]]),
         view: view([-1.6, 1.6, 1.7], [0.0; 3], [0.0, 0.0, 1.0], 45.0),
@@ -153,7 +152,8 @@ mod tests {
         let rough = ((2.0 / 2f64.powf(1.0 / 1.2)).powi(2) - 1.0).sqrt();
         assert!((rough - ROUGH).abs() < 1e-15, "{rough}");
         let mesh = terrain(6);
-        let (low, high) = mesh.vertices().iter().fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v[2]), h.max(v[2])));
+        let (low, high) =
+            mesh.vertices().iter().fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v[2]), h.max(v[2])));
         assert!((low + 0.7029533).abs() < 1e-7 && (high - 0.9231396).abs() < 1e-7, "{low} {high}");
         let SceneGeometry::Solids(solids) = mount(0).unwrap().geometry else { panic!() };
         let known = [

@@ -42,14 +42,21 @@ pub fn rings(size: u32) -> Result<Scene, SceneError> {
                 for (ring, points) in (1..).zip(&object) {
                     for i in 0..5 {
                         let (point, last) = (middle + points[i], middle + points[(i + 4) % 5]);
-                        pile.tube([last, point], [THIN; 2], ring);
+                        pile.frustum([last, point], [THIN; 2], ring);
                         pile.sphere(point, THIN, ring);
                     }
                 }
             }
         }
     }
-    let colors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]];
+    let colors = [
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 1.0],
+        [1.0, 0.0, 1.0],
+        [1.0, 1.0, 0.0],
+    ];
     let mut materials = vec![Material { color: [1.0; 3], ..Material::default() }];
     materials.extend(colors.map(|color| Material {
         color,

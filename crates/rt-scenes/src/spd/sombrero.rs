@@ -30,10 +30,8 @@ pub fn sombrero(size: u32) -> Result<Scene, SceneError> {
     for i in 0..n - 1 {
         for j in 0..n - 1 {
             let v = |i: u32, j: u32| i * n + j;
-            triangles.extend([
-                [v(i, j), v(i + 1, j + 1), v(i, j + 1)],
-                [v(i, j), v(i + 1, j), v(i + 1, j + 1)],
-            ]);
+            triangles
+                .extend([[v(i, j), v(i + 1, j + 1), v(i, j + 1)], [v(i, j), v(i + 1, j), v(i + 1, j + 1)]]);
         }
     }
     Ok(Scene {

@@ -52,7 +52,7 @@ pub fn tree(size: u32) -> Result<Scene, SceneError> {
 fn grow(pile: &mut Pile, forks: &[DMat3; 2], along: DMat3, base: DVec3, thick: f64, depth: u32) {
     let apex = base + along.z_axis;
     let thin = thick * 0.67;
-    pile.tube([base, apex], [0.15 * thick, 0.15 * thin], 1);
+    pile.frustum([base, apex], [0.15 * thick, 0.15 * thin], 1);
     pile.sphere(apex, 0.15 * thin, 1);
     if depth > 0 {
         for fork in forks {
