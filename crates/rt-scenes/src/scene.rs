@@ -271,7 +271,7 @@ const SCENES: &[(&str, Maker)] = &[
     ("tetra", |size| spd::tetra(size.unwrap_or(6))),
     ("tree", |size| spd::tree(size.unwrap_or(11))),
     ("stadium", |size| stadium::stadium(870.0, size.unwrap_or(12))),
-    ("interior", |size| interior::interior(size.unwrap_or(4))),
+    ("interior", |size| interior::interior(size.unwrap_or(3))),
     ("terrain", |size| terrain::terrain(size.unwrap_or(708))),
     ("soup", |size| triangles("soup", size, |n| soup::uniform(n, 1))),
     ("clusters", |size| triangles("clusters", size, |n| soup::clusters(n, 1))),

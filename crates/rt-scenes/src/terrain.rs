@@ -9,7 +9,7 @@ use rt_geom::glam::{DVec2, DVec3};
 /// Half the side of the land.
 const HALF: f64 = 10.0;
 /// How high mountains may be.
-const HIGH: f64 = 4.5;
+const HIGH: f64 = 2.4;
 
 /// Fractal mountains around lakes, on a grid of `size x size` cells of two triangles: a million at the default size of 708, 50
 /// million at 5000, the most.
@@ -70,8 +70,8 @@ pub fn terrain(size: u32) -> Result<Scene, SceneError> {
         material_of,
         lights: Light::shared(&[[-60.0, -30.0, 50.0]]),
         view: View {
-            from: DVec3::new(-3.0, -12.5, 5.5),
-            at: DVec3::new(0.0, -1.0, 0.6),
+            from: DVec3::new(-3.0, -12.5, 4.5),
+            at: DVec3::new(0.0, -1.0, 0.2),
             up: DVec3::Z,
             angle: std::f64::consts::FRAC_PI_4,
         },
@@ -88,11 +88,11 @@ fn cover([a, b, c]: [DVec3; 3]) -> u32 {
     let normal = (b - a).cross(c - a);
     let flat = normal.z * normal.z / normal.length_squared();
     let height = (a.z + b.z + c.z) / 3.0;
-    // Steeper than 45 degrees nothing grows, and snow slides off.
+    // Where it is steep nothing grows, and snow slides off.
     match height {
-        _ if flat < 0.4 => 2,
-        h if h > 0.45 * HIGH => 3,
-        h if h > 0.3 * HIGH => 2,
+        _ if flat < 0.45 => 2,
+        h if h > 0.5 * HIGH => 3,
+        h if h > 0.36 * HIGH => 2,
         _ => 1,
     }
 }
@@ -114,7 +114,7 @@ impl Land {
     /// Ridges, finer ones on what is high already.
     fn height(&self, at: DVec2) -> f64 {
         let (mut sum, mut weight, mut share) = (0.0, 1.0, 0.5);
-        let mut p = at * 0.17 + DVec2::new(5.3, 9.1);
+        let mut p = at * 0.12 + DVec2::new(5.3, 9.1);
         for octave in 0..10 {
             let ridge = 1.0 - 1.6 * self.noise(p, octave).abs();
             let signal = ridge * ridge * weight;
@@ -123,7 +123,7 @@ impl Land {
             share *= 0.48;
             p *= 2.03;
         }
-        HIGH * (sum - 0.42) / 0.58
+        HIGH * (sum - 0.3) / 0.7
     }
 
     /// Gradient noise, in `[-1, 1]`: 0 at grid points, with the slope that belongs to each.
