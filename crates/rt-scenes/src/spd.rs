@@ -146,6 +146,50 @@ mod tests {
     use super::*;
     use crate::by_name;
 
+    /// The sizes whose counts follow from the rules.
+    #[test]
+    fn primitives_are_as_many_as_the_rules_say() {
+        let count = |name, size| by_name(name, Some(size)).unwrap().prim_count();
+        for n in 1..=7u32 {
+            let m = n as usize;
+            assert_eq!(count("tetra", n), 4usize.pow(n));
+            assert_eq!(count("mount", n), 2 * 4usize.pow(n) + 4);
+            assert_eq!(count("tree", n), 4 * 2usize.pow(n) - 1);
+            assert_eq!(count("rings", n), 10 * m * (m + 1) * (2 * m + 1) + 1);
+            assert_eq!(count("teapot", n), 65 * m * m - 8 * m);
+            assert_eq!(count("lattice", n), (m + 1).pow(3) + 3 * m * (m + 1).pow(2));
+            assert_eq!(count("shells", n), 180 * 2usize.pow(n) + 1);
+        }
+        assert_eq!([1, 2, 3, 5, 9].map(|n| count("gears", n)), [147, 1_169, 3_943, 18_251, 106_435]);
+        assert_eq!([0, 1, 2, 5].map(|n| count("balls", n)), [2, 11, 92, 66_431]);
+        assert_eq!([1, 2, 3, 4, 5].map(|n| count("jacks", n)), [9, 81, 657, 5_265, 42_129]);
+        assert_eq!([1, 2, 3, 4].map(|n| count("sombrero", n)), [1_922, 7_938, 32_258, 130_050]);
+        assert_eq!(
+            [count("teapot", 40), count("lattice", 29), count("tree", 15)],
+            [103_680, 105_300, 131_071]
+        );
+    }
+
+    #[test]
+    fn boxes_are_as_published() {
+        let inside = |name, size, min: [f32; 3], max: [f32; 3]| {
+            let bound = by_name(name, Some(size)).unwrap().world_bound();
+            let near = |a: [f32; 3], b: [f32; 3]| {
+                a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1.01e-4 * b.abs().max(1.0))
+            };
+            let (low, high) = (bound.min.to_array(), bound.max.to_array());
+            assert!(near(low, min) && near(high, max), "{name}: {bound:?}");
+        };
+        inside("gears", 4, [-2.0, -2.0, 0.0], [2.0, 2.0, 1.0]);
+        inside("mount", 6, [-1.15961, -1.0, -0.70295], [1.0, 1.15961, 1.37821]);
+        inside("teapot", 12, [-4.0, -4.0, 0.0], [4.0, 4.0, 3.15]);
+        inside("tree", 11, [-50.0, -50.0, 0.0], [50.0, 50.0, 3.13749]);
+        inside("lattice", 12, [-1.0 / 48.0; 3], [1.0 + 1.0 / 48.0; 3]);
+        inside("shells", 5, [-27.3134, -21.5798, -50.706], [17.0498, 33.804, -0.0035]);
+        inside("jacks", 1, [-0.85477, -0.79952, -0.76035], [0.85477, 0.79952, 0.76035]);
+        inside("rings", 7, [-10.8389, 1.65358, -9.33895], [8.83895, 20.905, 10.3389]);
+    }
+
     #[test]
     fn primitives_are_as_many_as_published() {
         for known in KNOWN {

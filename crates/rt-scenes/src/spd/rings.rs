@@ -13,7 +13,7 @@ const THIN: f64 = 0.07412;
 /// of five cylinders and five spheres.
 ///
 /// Primitive 0 is the wall. Each object follows, ring by ring, a cylinder and then the sphere at its end: 4200 of each at the
-/// default size of 7, at most 664 200 of each at size 40. Its box without the wall is `[-10.8389, 8.83895] x [1.65358, 20.905] x
+/// default size of 7, at most 664 200 of each at size 40. Its box is `[-10.8389, 8.83895] x [1.65358, 20.905] x
 /// [-9.33895, 10.3389]` at size 7.
 ///
 /// Source: Haines, *Standard Procedural Databases*, `rings`.
