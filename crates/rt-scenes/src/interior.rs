@@ -44,7 +44,7 @@ pub fn interior(size: u32) -> Result<Scene, SceneError> {
     for line in 0..=n {
         let outside = line == 0 || line == n;
         for i in 0..n {
-            site.wall(line, i, outside, |along, across, z| DVec3::new(along, across, z));
+            site.wall(line, i, outside, DVec3::new);
             site.wall(line, i, outside, |along, across, z| DVec3::new(across, along, z));
         }
     }

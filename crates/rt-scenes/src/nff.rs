@@ -48,7 +48,7 @@ use rt_geom::glam::DVec3;
 use rt_shapes::{Frustum, Polygon, QuadricError, Sphere, SphereError};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
-use words::{Place, Words};
+use words::{Place, Words, start};
 pub use write::write;
 
 /// Why a file is not a scene: which file, where, and what is wrong.
@@ -144,7 +144,7 @@ impl fmt::Display for NffProblem {
 
 impl core::error::Error for NffError {}
 
-/// Reads the NFF file at `path`. A million triangles take about a second.
+/// Reads the NFF file at `path`. A million triangles, of 100 megabytes, take less than two seconds.
 ///
 /// What was passed over stands in the scene's [`warnings`](Scene::warnings).
 ///
@@ -242,7 +242,7 @@ impl Reader {
                         self.triangle(cut.map(|i| corners[i]))?;
                     }
                 }
-                other => return Err(NffProblem::Unknown(other.chars().take(40).collect())),
+                other => return Err(NffProblem::Unknown(start(other))),
             }
         }
         Ok(())
@@ -464,7 +464,7 @@ fn corners<T>(
 ) -> Result<Vec<T>, NffProblem> {
     let what = "the number of corners";
     let found = words.next()?.ok_or(NffProblem::Ends { what })?;
-    let bad = || NffProblem::Corners(found.chars().take(40).collect());
+    let bad = || NffProblem::Corners(start(found));
     let count = found.parse::<u32>().ok().filter(|&count| count >= 3).ok_or_else(bad)?;
     // Not more at once than a file of this size may hold: the number may be a mistake.
     let mut corners = Vec::with_capacity(count.min(256) as usize);

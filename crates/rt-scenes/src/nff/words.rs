@@ -78,20 +78,26 @@ impl<'a> Words<'a> {
         Ok(self.peek()?.is_some_and(|word| word.parse::<f64>().is_ok()))
     }
 
-    pub(super) fn number(&mut self, what: &'static str) -> Result<f64, NffProblem> {
+    /// The next word, which must be a finite number, and that number.
+    fn digits(&mut self, what: &'static str) -> Result<(&'a str, f64), NffProblem> {
         let word = self.next()?.ok_or(NffProblem::Ends { what })?;
-        let found = || word.chars().take(40).collect();
-        let value: f64 = word.parse().map_err(|_| NffProblem::Number { what, found: found() })?;
-        if value.is_finite() { Ok(value) } else { Err(NffProblem::NotFinite { what, found: found() }) }
+        let value: f64 = word.parse().map_err(|_| NffProblem::Number { what, found: start(word) })?;
+        if value.is_finite() {
+            Ok((word, value))
+        } else {
+            Err(NffProblem::NotFinite { what, found: start(word) })
+        }
+    }
+
+    pub(super) fn number(&mut self, what: &'static str) -> Result<f64, NffProblem> {
+        self.digits(what).map(|(_, value)| value)
     }
 
     /// A number as `f32` reads it.
     pub(super) fn single(&mut self, what: &'static str) -> Result<f32, NffProblem> {
-        let word = self.peek()?;
-        self.number(what)?;
-        let value: f32 = word.and_then(|word| word.parse().ok()).unwrap_or(f32::NAN);
-        let found = || word.unwrap_or_default().chars().take(40).collect();
-        if value.is_finite() { Ok(value) } else { Err(NffProblem::NotFinite { what, found: found() }) }
+        let (word, _) = self.digits(what)?;
+        let value = word.parse().unwrap_or(f32::NAN);
+        if value.is_finite() { Ok(value) } else { Err(NffProblem::NotFinite { what, found: start(word) }) }
     }
 
     pub(super) fn point(&mut self, what: &'static str) -> Result<DVec3, NffProblem> {
@@ -102,9 +108,8 @@ impl<'a> Words<'a> {
     pub(super) fn place(&mut self, what: &'static str) -> Result<Place, NffProblem> {
         let (mut wide, mut single) = ([0.0; 3], [0.0; 3]);
         for i in 0..3 {
-            let word = self.peek()?;
-            wide[i] = self.number(what)?;
-            single[i] = word.and_then(|word| word.parse().ok()).unwrap_or(f32::NAN);
+            let (word, value) = self.digits(what)?;
+            (wide[i], single[i]) = (value, word.parse().unwrap_or(f32::NAN));
         }
         Ok(Place { wide: DVec3::from_array(wide), single })
     }
@@ -113,4 +118,9 @@ impl<'a> Words<'a> {
     pub(super) fn color(&mut self, what: &'static str) -> Result<[f32; 3], NffProblem> {
         Ok([self.single(what)?, self.single(what)?, self.single(what)?])
     }
+}
+
+/// Enough of a word for a message.
+pub(super) fn start(word: &str) -> String {
+    word.chars().take(40).collect()
 }
