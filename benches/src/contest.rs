@@ -4,7 +4,7 @@ use crate::judge::{Answers, Judge, Sample};
 use crate::subject::RaySet;
 use core::fmt;
 use core::hint::black_box;
-use rt_accel::{Aggregate, Bounded, Counts, Geometry, Member, Primitive, Structure};
+use rt_accel::{Aggregate, Counts, Geometry, Member, Primitive, Structure};
 use rt_geom::{Ray, Real};
 use rt_measure::clock::{Plan, race};
 use rt_measure::error::HitError;
@@ -82,6 +82,10 @@ pub struct Measured {
     pub error: HitError,
     /// Whether distances were asked for.
     pub has_t: bool,
+    /// Of a bounding volume: the share of the lines that meet it which miss the thing inside.
+    pub void: Option<f64>,
+    /// What only this question tells, by name; in records behind the parameters.
+    pub figures: Vec<(&'static str, f64)>,
     /// Whether nobody in the group beats it in both of what the question weighs: error and time, or build time and time.
     pub on_front: bool,
 }
@@ -93,14 +97,18 @@ impl Group {
         let several = measured.len() > 1;
         let mut rows = Vec::new();
         for m in measured {
-            let speed = if several { format!(" speed={:.3}", m.speed) } else { String::new() };
+            let mut told: String =
+                m.figures.iter().map(|(name, x)| format!(" {name}={}", tidy(*x))).collect();
+            if several {
+                told += &format!(" speed={:.3}", m.speed);
+            }
             let row = |error_kind, error| Row {
                 date: stamp.date.clone(),
                 machine: stamp.machine.clone(),
                 commit: stamp.commit.clone(),
                 scene: self.scene.clone(),
                 structure: m.structure.clone(),
-                params: format!("{} judged={}{speed}", m.params, self.judged),
+                params: format!("{} judged={}{told}", m.params, self.judged),
                 ray_kind: self.ray_kind.clone(),
                 rays: self.rays as u64,
                 build_ms: m.build_ms.map(tidy),
@@ -116,6 +124,9 @@ impl Group {
             rows.push(row(ErrorKind::Wrong, tidy(m.error.wrong_per_million())));
             if m.has_t {
                 rows.push(row(ErrorKind::TUlp, tidy(m.error.t_ulp)));
+            }
+            if let Some(void) = m.void {
+                rows.push(row(ErrorKind::Void, tidy(void)));
             }
             if !m.error.is_exact() {
                 rows.push(row(ErrorKind::Missed, tidy(m.error.missed_per_million())));
@@ -155,6 +166,8 @@ pub(crate) enum Weigh {
     Error,
     /// What is missed: what is made up costs time alone, and is in it.
     Misses,
+    /// What lies between a volume and the thing inside.
+    Void,
     BuildTime,
 }
 
@@ -187,6 +200,8 @@ pub(crate) fn contest(
             sah: c.sah,
             error,
             has_t: matches!(c.answers, Answers::Closest32(_) | Answers::Closest64(_)),
+            void: None,
+            figures: Vec::new(),
             on_front: false,
         });
         let mut measured: Vec<Measured> = measured.collect();
@@ -207,6 +222,7 @@ pub(crate) fn mark_front(measured: &mut [Measured], weigh: Weigh) {
     let against = |m: &Measured| match weigh {
         Weigh::Error => m.error.wrong_per_million(),
         Weigh::Misses => m.error.missed_per_million(),
+        Weigh::Void => m.void.unwrap_or(f64::NAN),
         Weigh::BuildTime => m.build_ms.unwrap_or(f64::NAN),
     };
     let points: Vec<Point> =

@@ -7,6 +7,7 @@
 //! | [`Question::Build`] | what does each knob of [`BvhParams`](rt_bvh::BvhParams) buy, in build time and in time a ray? |
 //! | [`Question::Precision`] | what does the fast triangle test gain, and what does it get wrong? |
 //! | [`Question::Slab`] | which box test? |
+//! | [`Question::Volumes`] | which bounding volume, and when does it pay? |
 //! | [`Question::Rivals`] | how do other people's structures fare on the same rays? (feature `rivals`) |
 //!
 //! # How a figure comes about
@@ -60,7 +61,10 @@ mod queries;
 #[cfg(feature = "rivals")]
 mod rivals;
 mod slab;
+// Part of the question `volumes`.
+mod space;
 mod subject;
+mod volumes;
 
 pub use contest::{Group, Measured, Mismatch, Stamp};
 pub use fast::{FastMesh, TextbookRay};
@@ -88,18 +92,21 @@ pub enum Question {
     Precision,
     /// Which box test?
     Slab,
+    /// Which bounding volume, and when does it pay?
+    Volumes,
     /// How do others fare? Only with the feature `rivals`.
     Rivals,
 }
 
 impl Question {
     /// All questions.
-    pub const ALL: [Question; 6] = [
+    pub const ALL: [Question; 7] = [
         Question::Closest,
         Question::Any,
         Question::Build,
         Question::Precision,
         Question::Slab,
+        Question::Volumes,
         Question::Rivals,
     ];
 
@@ -111,6 +118,7 @@ impl Question {
             Question::Build => "build",
             Question::Precision => "precision",
             Question::Slab => "slab",
+            Question::Volumes => "volumes",
             Question::Rivals => "rivals",
         }
     }
@@ -123,16 +131,19 @@ impl Question {
             (Question::Build, Effort::Quick) => 30,
             (Question::Precision, Effort::Quick) => 12,
             (Question::Slab, _) => 2,
+            (Question::Volumes, Effort::Quick) => 30,
             (Question::Rivals, Effort::Quick) => 25,
             (Question::Closest, Effort::Normal) => 90,
             (Question::Any, Effort::Normal) => 60,
             (Question::Build, Effort::Normal) => 170,
             (Question::Precision, Effort::Normal) => 40,
+            (Question::Volumes, Effort::Normal) => 150,
             (Question::Rivals, Effort::Normal) => 200,
             (Question::Closest, Effort::Full) => 360,
             (Question::Any, Effort::Full) => 240,
             (Question::Build, Effort::Full) => 600,
             (Question::Precision, Effort::Full) => 90,
+            (Question::Volumes, Effort::Full) => 600,
             (Question::Rivals, Effort::Full) => 480,
         };
         Duration::from_secs(seconds)
@@ -258,6 +269,7 @@ pub fn ask(question: Question, options: &Options, watch: Watch<'_>) -> Result<Ve
         Question::Closest | Question::Any | Question::Precision => queries::ask(question, options, watch),
         Question::Build => knobs::ask(options, watch),
         Question::Slab => slab::ask(options.effort, watch),
+        Question::Volumes => volumes::ask(options.effort, watch),
         #[cfg(feature = "rivals")]
         Question::Rivals => rivals::ask(options, watch),
         #[cfg(not(feature = "rivals"))]

@@ -1,9 +1,9 @@
-//! Which box test?
+//! Which box test? Times are by ray and box, so that tests of one, two and eight boxes compare.
 
 use crate::contest::{Group, Measured, Mismatch, Weigh, mark_front};
 use crate::{Effort, TextbookRay, Trouble, Watch, hear};
 use core::hint::black_box;
-use rt_bounds::{Aabb, BoxPair, SlabRay};
+use rt_bounds::{Aabb, BoxOctet, BoxPair, Lanes, Portable, SlabRay};
 use rt_geom::Ray;
 use rt_geom::glam::{DVec3, Vec3A};
 use rt_measure::clock::race;
@@ -63,11 +63,26 @@ struct Way {
     test: fn(&Ready, &Aabb) -> bool,
 }
 
-const WAYS: [Way; 4] = [
+const WAYS: [Way; 7] = [
     Way {
         name: "slab-pair",
         never_misses: true,
         test: |ready, b| ready.slab.enter_pair(&BoxPair::new(b, b)).0 == 3,
+    },
+    Way {
+        name: "slab-eight",
+        never_misses: true,
+        test: |ready, b| ready.slab.enter_eight(&BoxOctet::new(&[*b; 8])).0 == 0xff,
+    },
+    Way {
+        name: "slab-eight-by-test",
+        never_misses: true,
+        test: |ready, b| ready.slab.enter_eight(&BoxOctet::new(&[*b; 8])).0 == 0xff,
+    },
+    Way {
+        name: "slab-eight-portable",
+        never_misses: true,
+        test: |ready, b| ready.slab.wide(Portable).enter_eight(&BoxOctet::new(&[*b; 8])).0 == 0xff,
     },
     Way { name: "slab-entry", never_misses: true, test: |ready, b| ready.slab.entry(b).is_some() },
     Way {
@@ -119,6 +134,13 @@ fn group(effort: Effort, kind: &str, boxes: &[Aabb], sets: &[Vec<Ray>]) -> Group
     Group { scene: "boxes".into(), prims: TIMED, ray_kind: kind.into(), rays: TIMED * TIMED, judged, outcome }
 }
 
+/// How many boxes the ray meets, with instructions chosen outside.
+#[inline(always)]
+fn count<L: Lanes>(lanes: L, ray: &SlabRay, octets: &[BoxOctet]) -> u32 {
+    let ray = ray.wide(lanes);
+    octets.iter().map(|eight| ray.enter_eight(eight).0.count_ones()).sum()
+}
+
 /// Each of some rays against each of some boxes. The loops are written out, because a call by pointer costs as much as a test.
 fn timed(
     effort: Effort,
@@ -129,6 +151,7 @@ fn timed(
 ) -> Vec<Measured> {
     let boxes = &boxes[..TIMED.min(boxes.len())];
     let pairs: Vec<BoxPair> = boxes.chunks_exact(2).map(|two| BoxPair::new(&two[0], &two[1])).collect();
+    let octets: Vec<BoxOctet> = boxes.chunks_exact(8).map(BoxOctet::new).collect();
     let world = boxes.iter().fold(Aabb::EMPTY, |world, b| world.union(*b));
     let rays: Vec<Ready> =
         sets.iter().flat_map(|set| set.first()).take(TIMED).map(|ray| ready(ray, &world)).collect();
@@ -136,6 +159,22 @@ fn timed(
         for ray in black_box(&rays) {
             let met: u32 = pairs.iter().map(|pair| ray.slab.enter_pair(pair).0.count_ones()).sum();
             black_box(met);
+        }
+    };
+    let mut eight = || {
+        for ray in black_box(&rays) {
+            black_box(rt_bounds::dispatch!(lanes => count(lanes, &ray.slab, &octets)));
+        }
+    };
+    let mut by_test = || {
+        for ray in black_box(&rays) {
+            let met: u32 = octets.iter().map(|eight| ray.slab.enter_eight(eight).0.count_ones()).sum();
+            black_box(met);
+        }
+    };
+    let mut portable = || {
+        for ray in black_box(&rays) {
+            black_box(count(Portable, &ray.slab, &octets));
         }
     };
     let mut entry = || {
@@ -153,7 +192,9 @@ fn timed(
             black_box(boxes.iter().filter(|b| ray.plain.entry_fast(b).is_some()).count());
         }
     };
-    let race = race(effort.plan(), &mut [&mut pair, &mut entry, &mut padded, &mut textbook]);
+    let mut contestants: [&mut dyn FnMut(); WAYS.len()] =
+        [&mut pair, &mut eight, &mut by_test, &mut portable, &mut entry, &mut padded, &mut textbook];
+    let race = race(effort.plan(), &mut contestants);
     let tests = (rays.len() * boxes.len()).max(1) as f64;
     let measured = WAYS.iter().zip(errors).enumerate().map(|(i, (way, error))| Measured {
         structure: way.name.into(),
@@ -168,6 +209,8 @@ fn timed(
         sah: None,
         error: *error,
         has_t: false,
+        void: None,
+        figures: Vec::new(),
         on_front: false,
     });
     let mut measured: Vec<Measured> = measured.collect();

@@ -72,6 +72,8 @@ enum Asked {
     Precision,
     /// Which box test?
     Slab,
+    /// Which bounding volume, and when does it pay?
+    Volumes,
     /// How do other people's structures fare?
     Rivals,
 }
@@ -84,6 +86,7 @@ impl Asked {
             Asked::Build => Question::Build,
             Asked::Precision => Question::Precision,
             Asked::Slab => Question::Slab,
+            Asked::Volumes => Question::Volumes,
             Asked::Rivals => Question::Rivals,
         }
     }
@@ -306,7 +309,7 @@ fn text(question: Question, groups: &[Group]) -> String {
             group.scene,
             thousands(group.prims as u64),
             thousands(group.rays as u64),
-            if question == Question::Slab {
+            if matches!(question, Question::Slab | Question::Volumes) {
                 format!("tests, {}", group.ray_kind)
             } else {
                 group.ray_kind.clone()
@@ -327,34 +330,41 @@ fn text(question: Question, groups: &[Group]) -> String {
     out
 }
 
-const COLUMNS: [&str; 14] = [
-    "",
-    "structure",
-    "params",
-    "build ms",
-    "B/prim",
-    "ns",
-    "spread",
-    "speed",
-    "nodes",
-    "tests",
-    "wrong/M",
-    "missed/M",
-    "invented/M",
-    "t ulp",
-];
-
+/// A table of all that anybody in the group tells.
 fn table(measured: &[Measured]) -> String {
-    let optional =
-        |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_string(), |x| format!("{x:.digits$}"));
-    let mut lines: Vec<Vec<String>> = vec![COLUMNS.map(String::from).to_vec()];
+    let optional = |x: Option<f64>, digits: usize| x.map_or_else(String::new, |x| format!("{x:.digits$}"));
+    let mut names: Vec<&'static str> = Vec::new();
+    for (name, _) in measured.iter().flat_map(|m| &m.figures) {
+        if !names.contains(name) {
+            names.push(name);
+        }
+    }
+    let mut header = vec![
+        "",
+        "structure",
+        "params",
+        "build ms",
+        "B/prim",
+        "ns",
+        "spread",
+        "speed",
+        "nodes",
+        "tests",
+        "wrong/M",
+        "missed/M",
+        "invented/M",
+        "t ulp",
+        "void",
+    ];
+    header.extend(&names);
+    let mut lines: Vec<Vec<String>> = vec![header.into_iter().map(String::from).collect()];
     for m in measured {
         let error = &m.error;
-        lines.push(vec![
+        let mut line = vec![
             if m.on_front { "*" } else { "" }.to_string(),
             m.structure.clone(),
             m.params.clone(),
-            optional(m.build_ms, 1),
+            optional(m.build_ms, if m.build_ms.is_some_and(|ms| ms < 0.1) { 4 } else { 1 }),
             optional(m.bytes_per_prim, 1),
             format!("{:.1}", m.ns_per_ray),
             format!("{:.2}", m.spread),
@@ -364,8 +374,23 @@ fn table(measured: &[Measured]) -> String {
             format!("{:.0}", error.wrong_per_million()),
             format!("{:.0}", error.missed_per_million()),
             format!("{:.0}", error.invented_per_million()),
-            if m.has_t { format!("{:.2}", error.t_ulp) } else { "-".to_string() },
-        ]);
+            optional(m.has_t.then_some(error.t_ulp), 2),
+            optional(m.void, 3),
+        ];
+        for name in &names {
+            let told = m.figures.iter().find(|(own, _)| own == name);
+            line.push(optional(told.map(|(_, x)| *x), 3));
+        }
+        lines.push(line);
+    }
+    // What nobody tells takes no room.
+    let told: Vec<bool> = (0..lines[0].len())
+        .map(|column| column < 3 || lines[1..].iter().any(|line| !line[column].is_empty()))
+        .collect();
+    for line in &mut lines {
+        let mut kept = told.iter();
+        line.retain(|_| *kept.next().unwrap_or(&true));
+        line.iter_mut().skip(3).filter(|cell| cell.is_empty()).for_each(|cell| *cell = "-".into());
     }
     aligned(&lines)
 }
@@ -454,6 +479,8 @@ fn json(stamp: &Stamp, threads: u16, answers: &[(Question, Vec<Group>)]) -> Json
             ("missed_per_million", Json::Number(m.error.missed_per_million())),
             ("invented_per_million", Json::Number(m.error.invented_per_million())),
             ("t_ulp", optional(m.has_t.then_some(m.error.t_ulp))),
+            ("void", optional(m.void)),
+            ("figures", Json::Object(m.figures.iter().map(|(name, x)| (*name, Json::Number(*x))).collect())),
             ("on_front", Json::Whole(m.on_front.into())),
         ])
     };

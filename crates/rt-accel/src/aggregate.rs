@@ -5,11 +5,12 @@ use crate::{
     Bounded, BuildError, Counts, Feed, Geometry, Hit, Leaf, Primitive, Refit, Structure, Visitor, Watch,
     WorldBound, unwatched,
 };
+use core::cell::Cell;
 use core::ops::ControlFlow;
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::expansion::two_sum;
 use rt_geom::glam::DVec3;
-use rt_geom::{Ray, Real};
+use rt_geom::{Ray, Real, Transform};
 use std::collections::HashSet;
 
 /// A geometry arranged by a structure; itself a [`Primitive`], so scenes nest.
@@ -95,6 +96,28 @@ impl<S: Structure, G: Bounded> WorldBound for Aggregate<S, G> {
         }
         let slack = DVec3::splat((origin.abs() + own.abs()).max_element() * f64::EPSILON);
         Aabb::from_f64(bound.min.as_dvec3() - slack, bound.max.as_dvec3() + slack, DVec3::ZERO)
+    }
+
+    /// The box of all primitives' carried boxes. Only nodes that may reach beyond what has been found are opened: of a tree over
+    /// `n` primitives a small part, of [`Exhaustive`](crate::Exhaustive) all.
+    fn bound_under(&self, map: &Transform) -> DAabb {
+        let found = Cell::new(DAabb::EMPTY);
+        // Room twice more, which is more than any primitive's own: what is in a node that is not opened could not have made the
+        // box larger by a rounding.
+        let mut keep = |node: &Aabb| {
+            let here = DAabb::from(*node);
+            !found.get().contains(node.carried(map).room(here, map).room(here, map))
+        };
+        let mut each = |leaf: Leaf<'_>| {
+            for &prim in leaf.prims {
+                let bound = self.geometry.bound_under(prim, map);
+                if bound.min.cmple(bound.max).all() {
+                    found.set(found.get().union(bound));
+                }
+            }
+        };
+        self.structure.gather(&mut keep, &mut each);
+        found.get()
     }
 }
 
@@ -243,6 +266,9 @@ impl<R: Real, G: Geometry<R>> Visitor<R> for CountedClosest<'_, G, G::At, R> {
     fn node(&mut self) {
         self.counts.nodes += 1;
     }
+    fn spared(&mut self) {
+        self.counts.spared += 1;
+    }
 }
 
 /// [`Any`], with counts.
@@ -265,6 +291,9 @@ impl<R: Real, G: Geometry<R>> Visitor<R> for CountedAny<'_, G> {
     }
     fn node(&mut self) {
         self.counts.nodes += 1;
+    }
+    fn spared(&mut self) {
+        self.counts.spared += 1;
     }
 }
 

@@ -11,6 +11,8 @@ pub struct Counts {
     pub leaves: u64,
     /// Primitives tested.
     pub prims: u64,
+    /// Tests spared by a mailbox: of primitives that the ray had met before.
+    pub spared: u64,
 }
 
 impl Add for Counts {
@@ -20,6 +22,7 @@ impl Add for Counts {
             nodes: self.nodes + other.nodes,
             leaves: self.leaves + other.leaves,
             prims: self.prims + other.prims,
+            spared: self.spared + other.spared,
         }
     }
 }

@@ -2,9 +2,9 @@
 
 use crate::{Counts, Hit, Primitive};
 use core::ops::ControlFlow;
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::DVec3;
-use rt_geom::{Ray, Real};
+use rt_geom::{Ray, Real, Transform};
 use std::sync::Arc;
 
 /// Numbered primitives with bounds: all a builder may know. A number that does not exist has a bound that is not valid, and is
@@ -19,6 +19,12 @@ pub trait Bounded: Send + Sync {
     /// The same box relative to `origin`. The default subtracts; geometry kept in `f64` does better.
     fn bound_from(&self, prim: u32, origin: DVec3) -> Aabb {
         self.bound(prim).relative_to(origin)
+    }
+
+    /// A box around `prim` once carried by `map`, as [`WorldBound::bound_under`](crate::WorldBound::bound_under). The default
+    /// carries the box.
+    fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
+        self.bound(prim).carried(map)
     }
 
     /// A box around the part of `prim` inside `cell`, both relative to `origin`. The default cuts the box.
@@ -135,6 +141,9 @@ impl<P: crate::WorldBound> Bounded for Vec<P> {
     fn bound_from(&self, prim: u32, origin: DVec3) -> Aabb {
         self.get(prim as usize).map_or(Aabb::EMPTY, |member| member.world_bound_from(origin))
     }
+    fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
+        self.get(prim as usize).map_or(DAabb::EMPTY, |member| member.bound_under(map))
+    }
 }
 
 impl<R: Real, P: Primitive<R>> Geometry<R> for Vec<P> {
@@ -187,6 +196,9 @@ macro_rules! forward {
             }
             fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
                 (**self).clipped_bound(prim, cell, origin)
+            }
+            fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
+                (**self).bound_under(prim, map)
             }
         }
 

@@ -2,7 +2,7 @@
 
 use crate::{Counts, Hit, Primitive, WorldBound};
 use core::ops::ControlFlow;
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real, Transform};
 
@@ -13,14 +13,18 @@ use rt_geom::{Ray, Real, Transform};
 /// five. Share what is inside with an `Arc`; instances nest to any depth. A primitive of one's own can be moved when it answers
 /// `f64`: write `impl<R: Real> Primitive<R> for Mine`, which serves both.
 ///
+/// An instance is found in its world bound: the box of what is inside, carried vertex by vertex where that is known
+/// ([`WorldBound::bound_under`]). Whether a ray meets that box is decided exactly, and hits are held within it, so that every
+/// structure finds the same: none can pass over a box whose ray is known to meet it.
+///
 /// Error: the ray inside is off by some `2^-53` of its distance from the instance, times the condition of the transform; what
 /// is inside decides exactly about that ray. From beyond about `10^7` times the size of a turned instance, hits within that
-/// error of its outline may be found or not, depending on the boxes above.
+/// error of its outline may be lost or made up, by all structures alike.
 ///
 /// ```
 /// use rt_accel::{Instance, Primitive};
 /// # use rt_accel::{Hit, WorldBound};
-/// # use rt_bounds::Aabb;
+/// # use rt_bounds::{Aabb, DAabb};
 /// # use rt_geom::{Ray, Transform, glam::{DVec3, Vec3A}};
 /// # struct Unit;
 /// # impl WorldBound for Unit { fn world_bound(&self) -> Aabb { Aabb::new(Vec3A::NEG_ONE.with_z(0.0), Vec3A::ONE.with_z(0.0)) } }
@@ -39,14 +43,28 @@ pub struct Instance<P> {
     inner: P,
     to_world: Transform,
     to_object: Transform,
+    /// Around all of it in the world.
+    bound: DAabb,
+}
+
+impl<P: WorldBound> Instance<P> {
+    /// `inner`, moved from its own space to the world by `to_world`, in the box of what is inside carried there.
+    ///
+    /// Of an aggregate this opens the part of its tree that may lie at the outline; of an exhaustive one all.
+    pub fn new(inner: P, to_world: Transform) -> Instance<P> {
+        let bound = inner.bound_under(&to_world);
+        Instance { inner, to_world, to_object: to_world.inverse(), bound }
+    }
+
+    /// The same, in the box of the carried box of what is inside: `O(1)`, for instances that move before many rays have met them.
+    /// Looser where what is inside leaves the corners of its own box empty: 3.3 times the surface for turned octahedra.
+    pub fn boxed(inner: P, to_world: Transform) -> Instance<P> {
+        let bound = inner.world_bound().carried(&to_world);
+        Instance { inner, to_world, to_object: to_world.inverse(), bound }
+    }
 }
 
 impl<P> Instance<P> {
-    /// `inner`, moved from its own space to the world by `to_world`.
-    pub fn new(inner: P, to_world: Transform) -> Instance<P> {
-        Instance { inner, to_world, to_object: to_world.inverse() }
-    }
-
     /// What is moved.
     pub fn inner(&self) -> &P {
         &self.inner
@@ -65,6 +83,36 @@ impl<P> Instance<P> {
     pub fn object_ray<R: Real>(&self, ray: &Ray<R>) -> Ray<f64> {
         Ray { t_max: ray.t_max.reach(), ..self.to_object.ray(ray) }
     }
+
+    /// The ray inside and where it may hit, if it meets the world bound.
+    #[inline(always)]
+    fn enter<R: Real>(&self, ray: &Ray<R>) -> Option<(Ray<f64>, Held)> {
+        let reach = ray.t_max.reach();
+        let [near, far] = self.bound.span(&Ray { t_max: reach, ..ray.widen() })?;
+        let mut inside = self.to_object.ray(ray);
+        // A ray that ends behind the box ends nowhere: what is hit then does not depend on where exactly it ends.
+        inside.t_max = if far <= reach { f64::INFINITY } else { reach };
+        Some((inside, Held { near, far, t_min: ray.t_min.into() }))
+    }
+}
+
+/// Where hits of an instance lie: in its world bound.
+struct Held {
+    near: f64,
+    far: f64,
+    t_min: f64,
+}
+
+impl Held {
+    /// `t`, if it is there, else the end that it missed by a rounding of the ray inside. NaN stays NaN.
+    #[inline(always)]
+    fn hold(&self, t: f64) -> f64 {
+        match t {
+            t if t < self.near => self.near.max(self.t_min),
+            t if t > self.far => self.far.max(self.t_min),
+            t => t,
+        }
+    }
 }
 
 impl<P: WorldBound> WorldBound for Instance<P> {
@@ -72,7 +120,13 @@ impl<P: WorldBound> WorldBound for Instance<P> {
         self.world_bound_from(DVec3::ZERO)
     }
     fn world_bound_from(&self, origin: DVec3) -> Aabb {
-        self.inner.world_bound().transformed(&self.to_world, origin)
+        self.bound.relative_to(origin)
+    }
+    fn bound_under(&self, map: &Transform) -> DAabb {
+        match self.to_world.then(map) {
+            Ok(both) => self.inner.bound_under(&both),
+            Err(_) => self.world_bound().carried(map),
+        }
     }
 }
 
@@ -81,28 +135,31 @@ impl<R: Real, P: Primitive<f64>> Primitive<R> for Instance<P> {
 
     #[inline]
     fn intersect(&self, ray: &Ray<R>) -> Option<Hit<P::At, R>> {
-        let hit = self.inner.intersect(&self.object_ray(ray))?;
-        Some(Hit { t: ray.admit(hit.t)?, at: hit.at })
+        let (inside, held) = self.enter(ray)?;
+        let hit = self.inner.intersect(&inside)?;
+        Some(Hit { t: ray.admit(held.hold(hit.t))?, at: hit.at })
     }
     #[inline]
     fn intersect_p(&self, ray: &Ray<R>) -> bool {
-        self.inner.intersect_p(&self.object_ray(ray))
+        self.enter(ray).is_some_and(|(inside, _)| self.inner.intersect_p(&inside))
     }
     fn all_hits(
         &self,
         ray: &Ray<R>,
         each: &mut dyn FnMut(Hit<P::At, R>) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        self.inner.all_hits(&self.object_ray(ray), &mut |hit| match ray.admit(hit.t) {
+        let Some((inside, held)) = self.enter(ray) else { return ControlFlow::Continue(()) };
+        self.inner.all_hits(&inside, &mut |hit| match ray.admit(held.hold(hit.t)) {
             Some(t) => each(Hit { t, at: hit.at }),
             None => ControlFlow::Continue(()),
         })
     }
     fn intersect_counted(&self, ray: &Ray<R>, counts: &mut Counts) -> Option<Hit<P::At, R>> {
-        let hit = self.inner.intersect_counted(&self.object_ray(ray), counts)?;
-        Some(Hit { t: ray.admit(hit.t)?, at: hit.at })
+        let (inside, held) = self.enter(ray)?;
+        let hit = self.inner.intersect_counted(&inside, counts)?;
+        Some(Hit { t: ray.admit(held.hold(hit.t))?, at: hit.at })
     }
     fn intersect_p_counted(&self, ray: &Ray<R>, counts: &mut Counts) -> bool {
-        self.inner.intersect_p_counted(&self.object_ray(ray), counts)
+        self.enter(ray).is_some_and(|(inside, _)| self.inner.intersect_p_counted(&inside, counts))
     }
 }

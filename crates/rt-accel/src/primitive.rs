@@ -2,9 +2,9 @@
 
 use crate::Counts;
 use core::ops::ControlFlow;
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::DVec3;
-use rt_geom::{Ray, Real};
+use rt_geom::{Ray, Real, Transform};
 use std::sync::Arc;
 
 /// A ray met something at `t`, in lengths of its direction; `at` says where, in the words of what was hit.
@@ -24,6 +24,12 @@ pub trait WorldBound: Send + Sync {
     /// The same box relative to `origin`. The default subtracts; things kept in `f64` do better.
     fn world_bound_from(&self, origin: DVec3) -> Aabb {
         self.world_bound().relative_to(origin)
+    }
+
+    /// A box around all of it once carried by `map`, with [room](DAabb::room) for roundings. The default carries the world
+    /// bound, which is loose for what is turned; whoever can carry vertices, or knows better, says better.
+    fn bound_under(&self, map: &Transform) -> DAabb {
+        self.world_bound().carried(map)
     }
 }
 
@@ -109,6 +115,9 @@ macro_rules! forward {
             #[inline]
             fn world_bound_from(&self, origin: DVec3) -> Aabb {
                 (**self).world_bound_from(origin)
+            }
+            fn bound_under(&self, map: &Transform) -> DAabb {
+                (**self).bound_under(map)
             }
         }
 

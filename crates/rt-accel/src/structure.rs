@@ -19,6 +19,10 @@ pub trait Visitor<R: Real = f32> {
     /// A node was opened. Free unless someone counts.
     #[inline(always)]
     fn node(&mut self) {}
+
+    /// A primitive that the ray had met before was dropped from a leaf. Free unless someone counts.
+    #[inline(always)]
+    fn spared(&mut self) {}
 }
 
 /// Hands out rays with their visitors and takes the visitors back. Pulled, so that the few rays in flight live beside the

@@ -2,7 +2,7 @@
 
 use rt_geom::expansion::two_sum;
 use rt_geom::glam::{DVec3, Vec3A};
-use rt_geom::{Axis, Transform, f32_below};
+use rt_geom::{Axis, Ray, Real, Transform, Vector, f32_below};
 
 /// Beyond this size an outward-rounded coordinate becomes infinite: differences of two smaller ones never overflow.
 const FAR: f64 = (1u128 << 126) as f64;
@@ -157,42 +157,103 @@ impl Aabb {
         if area.is_nan() { f32::INFINITY } else { area }
     }
 
+    /// The volume; 0 when empty, infinite when a side is (even of a flat box) or when it overflows.
+    #[inline]
+    pub fn volume(self) -> f32 {
+        let s = self.size().as_dvec3();
+        let volume = s.x * s.y * s.z;
+        if volume.is_nan() { f32::INFINITY } else { volume as f32 }
+    }
+
+    /// The eight corners: `x` changes fastest, the least first. Meaningless when empty.
+    pub fn corners(self) -> [Vec3A; 8] {
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|i| {
+            let pick = |bit: usize, a: usize| if i >> bit & 1 == 0 { self.min[a] } else { self.max[a] };
+            Vec3A::new(pick(0, 0), pick(1, 1), pick(2, 2))
+        })
+    }
+
+    /// Whether the point lies in the box, on its faces too; false for NaN.
+    #[inline]
+    pub fn contains_point(self, p: Vec3A) -> bool {
+        (self.min.cmple(p) & p.cmple(self.max)).all()
+    }
+
+    /// The point of the box nearest to `p`, exactly; `p` itself if it lies in the box. Meaningless when empty.
+    #[inline]
+    pub fn closest_point(self, p: Vec3A) -> Vec3A {
+        p.max(self.min).min(self.max)
+    }
+
+    /// The squared distance from `p`, 0 inside and infinite from an empty box, within `5 u` relatively, `u = 2^-53`, as
+    /// long as it neither under- nor overflows. NaN for a NaN.
+    pub fn distance_squared(self, p: DVec3) -> f64 {
+        if self.is_empty() {
+            return f64::INFINITY;
+        }
+        let mut sum = 0.0;
+        for a in 0..3 {
+            let (below, above) = (self.min[a] as f64 - p[a], p[a] - self.max[a] as f64);
+            // At most one of them is positive; NaN stays.
+            let off = if below > 0.0 {
+                below
+            } else if above <= 0.0 {
+                0.0
+            } else {
+                above
+            };
+            sum += off * off;
+        }
+        sum
+    }
+
+    /// The part of a ray that may lie in the box, its ends in units of the ray's `t`, rounded outward by a few `u =
+    /// 2^-53`: it holds all `t` of the interval for which the exact point lies in the box. `None` where there are none.
+    /// Segments are rays with an interval; for many boxes, a [`SlabRay`](crate::SlabRay) answers faster.
+    ///
+    /// ```
+    /// # use rt_bounds::Aabb;
+    /// # use rt_geom::{Ray, glam::Vec3A};
+    /// let b = Aabb::new(Vec3A::ZERO, Vec3A::ONE);
+    /// let segment = Ray::new(Vec3A::new(-1.0, 0.5, 0.5), Vec3A::X * 4.0).between(0.0, 1.0);
+    /// let [enter, leave] = b.clip(&segment).unwrap();
+    /// assert!(enter <= 0.25 && 0.25 - enter < 1e-15 && leave >= 0.5 && leave - 0.5 < 1e-15);
+    /// ```
+    pub fn clip<R: Real>(self, ray: &Ray<R>) -> Option<[f64; 2]> {
+        if !(self.is_valid() && ray.is_valid()) {
+            return None;
+        }
+        let (o, d) = (ray.origin.widen(), ray.dir.widen());
+        let (mut enter, mut leave): (f64, f64) = (ray.t_min.into(), ray.t_max.into());
+        for a in 0..3 {
+            let (below, above) = (self.min[a] as f64 - o[a], self.max[a] as f64 - o[a]);
+            if d[a] == 0.0 {
+                if below > 0.0 || above < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let (first, last) =
+                if d[a] > 0.0 { (below / d[a], above / d[a]) } else { (above / d[a], below / d[a]) };
+            // One rounding each of the difference and of the quotient, and no exact distance is infinite but to a side
+            // that is.
+            let slack = 2.0 * f64::EPSILON;
+            enter = enter.max((first - first.abs() * slack).next_down().min(f64::MAX));
+            leave = leave.min((last + last.abs() * slack).next_up().max(f64::MIN));
+        }
+        (enter <= leave).then_some([enter, leave])
+    }
+
     /// The axis along which the box is longest; the first of equals.
     #[inline]
     pub fn longest_axis(self) -> Axis {
         Axis::longest(self.size())
     }
 
-    /// A box around this one carried by `map`, given relative to `origin`: the box of the carried corners, rounded outward
-    /// and grown by the error of the map and of rays carried back through it from nearby.
-    ///
-    /// Source: Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems (1990), in centre and half-size form.
+    /// A box around this one carried by `map`, given relative to `origin`: [`Aabb::carried`], rounded outward.
     pub fn transformed(self, map: &Transform, origin: DVec3) -> Aabb {
-        if !self.is_valid() {
-            return self;
-        }
-        let (min, max) = (self.min.as_dvec3(), self.max.as_dvec3());
-        if !(min.is_finite() && max.is_finite()) {
-            return Aabb::INFINITE;
-        }
-        let m = map.linear();
-        let half = (max - min) * 0.5;
-        let reach = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
-        let center = map.point((min + max) * 0.5);
-        // Rounding of the box and of a ray moved into the box's own space, both in f64; exact maps keep exact boxes.
-        let slack = if exact(m) { 0.0 } else { map.condition() * 32.0 * f64::EPSILON };
-        let pad = (center.abs() + reach) * slack.min(1.0);
-        Aabb::from_f64(center - reach - pad, center + reach + pad, origin)
+        if self.is_valid() { self.carried(map).relative_to(origin) } else { self }
     }
-}
-
-/// Whether a linear map only permutes, mirrors and scales by powers of two: then nothing rounds.
-fn exact(m: rt_geom::glam::DMat3) -> bool {
-    let power_of_two = |x: f64| x.to_bits() << 12 == 0; // or zero
-    m.to_cols_array().into_iter().all(power_of_two)
-        && [m.x_axis, m.y_axis, m.z_axis]
-            .into_iter()
-            .all(|c| c.to_array().iter().filter(|x| **x == 0.0).count() == 2)
 }
 
 /// `x - origin` rounded down to `f32`, `-inf` beyond reach. NaN stays NaN.

@@ -1,4 +1,4 @@
-//! Volumes that enclose things, and the slab test.
+//! Volumes that enclose things, and the tests of rays, cones and beams against them.
 //!
 //! Boxes are `f32` and always rounded outward; a ray of either precision meets them through a [`SlabRay`], which encloses the
 //! ray it is made from. So a traversal may say *hit* too often, by a few units in the last place, and never *miss* wrongly:
@@ -22,9 +22,34 @@
 //! yet, because the conservative test costs no operation more.
 
 mod aabb;
+mod cloud;
+mod double;
+mod hull;
+mod kdop;
+mod lanes;
+mod moving;
+mod obb;
+mod octet;
+mod overlap;
 mod slab;
+mod solid;
+mod sphere;
+mod unit_ray;
 mod volume;
 
 pub use aabb::Aabb;
+pub use double::DAabb;
+pub use hull::{Hull, HullError, Polytope, PolytopeRay};
+pub use kdop::{Kdop, KdopRay};
+pub use lanes::{Eight, Lanes, Portable};
+pub use obb::Obb;
+pub use octet::{BoxOctet, WideRay};
+pub use overlap::{BeamTest, ConeTest};
 pub use slab::{BoxPair, SlabRay};
+pub use sphere::{BoundingSphere, Extremes};
+pub use unit_ray::UnitRay;
 pub use volume::BoundingVolume;
+
+#[cfg(feature = "simd")]
+#[doc(hidden)]
+pub use fearless_simd;

@@ -34,16 +34,16 @@ const SLACK: f64 = 6.0 / (1u64 << 24) as f64;
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
     /// For each axis: near origin twice, far origin twice.
-    origin: [Vec4; 3],
+    pub(crate) origin: [Vec4; 3],
     /// For each axis: near reciprocal twice, negated far reciprocal twice.
-    inverse: [Vec4; 3],
+    pub(crate) inverse: [Vec4; 3],
     /// Whether the direction is negative along each axis: then `max` is the near plane.
-    negative: [bool; 3],
+    pub(crate) negative: [bool; 3],
     /// `t` of the caller to distance here: `(t - start) * unit`.
     start: f64,
     unit: f64,
-    near: f32,
-    far: f32,
+    pub(crate) near: f32,
+    pub(crate) far: f32,
 }
 
 /// Two boxes side by side, in the order the slab test reads them: for each axis the two `min`, then the two `max`.
@@ -151,26 +151,10 @@ impl SlabRay {
             let exact = start == 0.0 && (origin[a] == 0.0 || x + origin[a] == o[a] && o[a] - x == origin[a]);
             let error =
                 if exact { 0.0 } else { (o[a].abs() + shift.abs() + origin[a].abs()) * (4.0 * f64::EPSILON) };
-            let error = if x.abs() < NEAR { error + STEP } else { error };
-            let (below, above) = if x.abs() + error <= FAR {
-                (f32_below(x - error), f32_above(x + error))
-            } else {
-                (f32::NEG_INFINITY, f32::INFINITY)
-            };
-            let r = 1.0 / dir[a];
-            let negative = r < 0.0;
-            let near = ((r.abs() * (1.0 - SLACK)) as f32).min(f32::MAX);
-            let far = (r.abs() * (1.0 + SLACK)) as f32;
-            // Seen along the direction: the near origin lies ahead, the far origin behind.
-            let (ahead, behind, sign) = if negative { (below, above, -1.0) } else { (above, below, 1.0) };
-            let behind = match (far.is_infinite(), negative) {
-                (false, _) => behind,
-                (true, false) => behind.next_down(),
-                (true, true) => behind.next_up(),
-            };
-            slab.origin[a] = Vec4::new(ahead, ahead, behind, behind);
-            slab.inverse[a] = Vec4::new(near, near, -far, -far) * sign;
-            slab.negative[a] = negative;
+            let side = SlabSide::new(x, error, 1.0 / dir[a]);
+            slab.origin[a] = Vec4::new(side.ahead, side.ahead, side.behind, side.behind);
+            slab.inverse[a] = Vec4::new(side.near, side.near, -side.far, -side.far);
+            slab.negative[a] = side.negative;
         }
         slab.near = f32_below((t_min.next_down() - start).max(0.0) * unit) * (1.0 - SLACK as f32);
         slab.shorten(ray.t_max);
@@ -194,24 +178,110 @@ impl SlabRay {
         (met & 1 == 1).then_some(entry[0])
     }
 
+    /// Where the ray enters the box and where it leaves it or ends, rounded outward, in the unit of [`SlabRay::entry`]; `None` for
+    /// a certain miss.
+    #[inline]
+    pub fn span(&self, b: &Aabb) -> Option<[f32; 2]> {
+        let t = self.spans(&BoxPair::new(b, b));
+        (t.x <= -t.z).then_some([t.x, -t.z])
+    }
+
+    /// Where the ray crosses the plane at `position` on `axis`, rounded down and up, in the unit of [`SlabRay::entry`]: for
+    /// structures that split space. A crossing behind the ray's start is negative, by some amount. A ray parallel to the plane
+    /// crosses it beyond everything (`[large, inf]`) or before (`[-large, -inf]`), and one within it all along (`[0, inf]`).
+    #[inline(always)]
+    pub fn crossing(&self, axis: Axis, position: f32) -> [f32; 2] {
+        let (o, i) = (self.origin[axis.index()], self.inverse[axis.index()]);
+        [(position - o.x) * i.x, (o.z - position) * i.z]
+    }
+
+    /// Whether the ray's direction is negative along each axis: it then meets the greater of two planes first.
+    #[inline(always)]
+    pub fn negative(&self) -> [bool; 3] {
+        self.negative
+    }
+
     /// The distance beyond which no box matters, in the unit of [`SlabRay::entry`].
     #[inline(always)]
     pub fn far(&self) -> f32 {
         self.far
     }
 
+    /// The ray along an axis.
+    #[inline(always)]
+    pub(crate) fn side(&self, a: usize) -> SlabSide {
+        let (origin, inverse) = (self.origin[a], self.inverse[a]);
+        SlabSide {
+            ahead: origin.x,
+            behind: origin.z,
+            near: inverse.x,
+            far: -inverse.z,
+            negative: self.negative[a],
+        }
+    }
+
+    /// The least distance, the `t` it is measured from, and the power of two by which `t` becomes distance.
+    #[inline(always)]
+    pub(crate) fn scale(&self) -> (f32, f64, f64) {
+        (self.near, self.start, self.unit)
+    }
+
     /// [`SlabRay::entry`] of two boxes at once: which are met (bit 0 the left, bit 1 the right), and where.
     #[inline(always)]
     pub fn enter_pair(&self, pair: &BoxPair) -> (u32, [f32; 2]) {
+        let t = self.spans(pair);
+        let met = t.cmple(-t.zwzw()).bitmask() & 3;
+        (met, [t.x, t.y])
+    }
+
+    /// Entries into two boxes, and exits negated, so that one maximum serves both.
+    #[inline(always)]
+    fn spans(&self, pair: &BoxPair) -> Vec4 {
         let mut t = Vec4::new(self.near, self.near, -self.far, -self.far);
         for a in 0..3 {
             let planes = Vec4::from_array(pair.planes[a]);
             let planes = if self.negative[a] { planes.zwxy() } else { planes };
-            // Entries, and exits negated, so that one maximum serves both.
             t = ((planes - self.origin[a]) * self.inverse[a]).max(t);
         }
-        let met = t.cmple(-t.zwzw()).bitmask() & 3;
-        (met, [t.x, t.y])
+        t
+    }
+}
+
+/// A ray along one direction across slabs: what [`SlabRay`] holds for each axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SlabSide {
+    /// The origin for near planes.
+    pub(crate) ahead: f32,
+    /// The origin for far planes.
+    pub(crate) behind: f32,
+    /// The reciprocal for near planes, with its sign.
+    pub(crate) near: f32,
+    /// The reciprocal for far planes, with its sign.
+    pub(crate) far: f32,
+    /// Whether the ray descends: then the upper plane is the near one.
+    pub(crate) negative: bool,
+}
+
+impl SlabSide {
+    /// Encloses a ray that is at `x`, give or take `error`, and climbs by `1 / r` a unit of distance; `r` may be infinite.
+    pub(crate) fn new(x: f64, error: f64, r: f64) -> SlabSide {
+        let error = if x.abs() < NEAR { error + STEP } else { error };
+        let (below, above) = if x.abs() + error <= FAR {
+            (f32_below(x - error), f32_above(x + error))
+        } else {
+            (f32::NEG_INFINITY, f32::INFINITY)
+        };
+        let negative = r < 0.0;
+        let near = ((r.abs() * (1.0 - SLACK)) as f32).min(f32::MAX);
+        let far = (r.abs() * (1.0 + SLACK)) as f32;
+        // Seen along the direction: the near origin lies ahead, the far origin behind.
+        let (ahead, behind, sign) = if negative { (below, above, -1.0) } else { (above, below, 1.0) };
+        let behind = match (far.is_infinite(), negative) {
+            (false, _) => behind,
+            (true, false) => behind.next_down(),
+            (true, true) => behind.next_up(),
+        };
+        SlabSide { ahead, behind, near: near * sign, far: far * sign, negative }
     }
 }
 

@@ -1,14 +1,12 @@
 //! The tree answers as every primitive in turn does, bit for bit: closest, any, all, many; in both precisions.
 
-use rt_accel::{Bounded, Instance, Structure};
-use rt_bounds::Aabb;
+use rt_accel::Instance;
 use rt_bvh::{Builder, Bvh, BvhParams};
-use rt_geom::Real;
 use rt_geom::glam::DVec3;
-use rt_geom::{Ray, Transform};
-use rt_measure::{conform, rays};
-use rt_scenes::{SceneGeometry, Solid};
-use rt_shapes::TriangleMesh;
+use rt_geom::{Ray, Real, Transform};
+use rt_measure::conform;
+use rt_measure::rays::{self, troublesome};
+use rt_scenes::{SceneGeometry, Solid, Trial};
 
 /// The default, and trees as bad as the parameters can make them.
 fn params() -> [BvhParams; 2] {
@@ -21,55 +19,26 @@ fn params() -> [BvhParams; 2] {
     [BvhParams::default(), deep]
 }
 
-/// Rays that make trouble for this geometry: at its vertices, in the faces of its boxes, through all of it.
-fn troublesome<R: Real>(source: &dyn Bounded, points: &[DVec3]) -> Vec<Ray<R>> {
-    let finite = |b: &Aabb| b.is_valid() && b.min.is_finite() && b.max.is_finite();
-    let bounds = (0..source.prim_count() as u32).map(|prim| source.bound(prim)).filter(finite);
-    let world = bounds.fold(Aabb::EMPTY, Aabb::union);
-    if !world.is_valid() {
-        return Vec::new();
-    }
-    let some: Vec<DVec3> =
-        points.iter().copied().filter(|p| p.is_finite()).step_by(1 + points.len() / 24).collect();
-    let mut all = rays::uniform(1, &world, 60);
-    all.extend(rays::aimed(2, &world, &some, 2));
-    all.extend(rays::axis_parallel(&world, &some[..some.len().min(8)]));
-    all.extend(rays::in_faces(3, &world, 24));
-    all.extend(rays::inside(4, &world, 24));
-    all
-}
-
-fn vertices<V: Real>(mesh: &TriangleMesh<V>) -> Vec<DVec3> {
-    let widen = |v: &[V; 3]| DVec3::from_array(v.map(Into::into));
-    let mut points: Vec<DVec3> = mesh.vertices().iter().map(widen).collect();
-    for corners in mesh.triangles().iter().step_by(7) {
-        let [a, b, _] = corners.map(|i| points[i as usize]);
-        points.push((a + b) * 0.5);
-    }
-    points
-}
-
-fn check<S: Structure<Params = BvhParams>, V: Real + Into<R>, R: Real>(name: &str, mesh: &TriangleMesh<V>) {
-    let rays = troublesome::<R>(mesh, &vertices(mesh));
-    for params in params() {
-        conform::conform::<S, R, _>(name, mesh, &params, &rays).unwrap_or_else(|why| panic!("{why}"));
-    }
+fn check<V: Real + Into<R>, R: Real>(trial: &Trial<V>) {
+    let rays = troublesome::<R>(&trial.mesh, &trial.points());
+    conform::conform_all::<Bvh, R, _>(&trial.name, &trial.mesh, &params(), &rays)
+        .unwrap_or_else(|why| panic!("{why}"));
 }
 
 #[test]
 fn on_every_trial_in_f32() {
     for trial in rt_scenes::trials() {
-        check::<Bvh, f32, f32>(&trial.name, &trial.mesh);
+        check::<f32, f32>(&trial);
     }
 }
 
 #[test]
 fn on_every_trial_in_f64() {
     for trial in rt_scenes::trials() {
-        check::<Bvh, f32, f64>(&trial.name, &trial.mesh);
+        check::<f32, f64>(&trial);
     }
     for trial in rt_scenes::fine_trials() {
-        check::<Bvh, f64, f64>(&trial.name, &trial.mesh);
+        check::<f64, f64>(&trial);
     }
 }
 
@@ -127,13 +96,61 @@ fn on_instances_of_instances() {
 }
 
 #[test]
+fn on_turned_instances_seen_from_very_far() {
+    use rt_accel::{Aggregate, Exhaustive, Primitive};
+    use std::sync::Arc;
+    let torus = rt_scenes::soup::torus(6, 5, 0.3);
+    let corners = Trial { name: String::new(), mesh: torus.clone() }.points();
+    let torus = Arc::new(Aggregate::<Bvh, _>::build(torus, &BvhParams::default()).unwrap());
+    let maps: Vec<Transform> = (0..3)
+        .map(|i| {
+            let turn = if i == 0 { std::f64::consts::FRAC_PI_2 } else { 0.7 * i as f64 };
+            Transform::rotation(DVec3::new(1.0, 0.3 * i as f64, 0.0), turn)
+                .and_then(|t| {
+                    t.then(&Transform::translation(DVec3::new(30.0 * i as f64, 20.0 * i as f64, 9.1)))
+                })
+                .unwrap()
+        })
+        .collect();
+    let field: Vec<_> = maps.iter().map(|map| Instance::new(torus.clone(), *map)).collect();
+    let tree =
+        Aggregate::<Bvh, _>::build(field.clone(), &BvhParams { leaf_prims: 1, ..BvhParams::default() })
+            .unwrap();
+    let each = Aggregate::<Exhaustive, _>::build(field, &()).unwrap();
+    // Beside the outline of each instance, by less than the ray inside is off.
+    let mut seeded = rays::Seeded::new(9);
+    let mut hits = 0;
+    for case in 0..4000 {
+        let (map, axis) = (&maps[case % 3], case / 3 % 3);
+        let sign = [1.0, -1.0][case / 9 % 2];
+        let carried = corners.iter().map(|p| map.point(*p));
+        let outer = carried.max_by(|p, q| (sign * p[axis]).total_cmp(&(sign * q[axis]))).unwrap();
+        let along = (axis + 1 + case / 18 % 2) % 3;
+        let distance = [1e8, -1e10, 1e13][case / 36 % 3];
+        let off = 10f64.powf(seeded.between(-18.0, -13.0)) * f64::abs(distance);
+        let (mut origin, mut dir) = (outer, DVec3::ZERO);
+        origin[axis] += if seeded.below(2) == 0 { sign * off } else { -sign * off };
+        origin[3 - axis - along] += seeded.between(-off, off);
+        origin[along] -= distance;
+        dir[along] = f64::signum(distance);
+        let ray = Ray::new(origin, dir);
+        let found = each.intersect(&ray);
+        assert_eq!(tree.intersect(&ray), found, "{}", conform::paste(&ray));
+        assert_eq!(tree.intersect_p(&ray), found.is_some());
+        hits += usize::from(found.is_some());
+    }
+    assert!(hits > 100, "{hits} hits");
+}
+
+#[test]
 fn after_a_refit() {
     let before = rt_scenes::soup::uniform(500, 3);
     let mut after = before.clone();
     for [x, y, z] in after.vertices_mut() {
         (*x, *y, *z) = (*y - 0.5 * *z, 2.0 * *x, *z + 3.0);
     }
-    let rays = troublesome::<f32>(&after, &vertices(&after));
+    let points = Trial { name: String::new(), mesh: after.clone() }.points();
+    let rays = troublesome::<f32>(&after, &points);
     conform::conform_refit::<Bvh, f32, _>("soup of 500", &before, &after, &BvhParams::default(), &rays)
         .unwrap_or_else(|why| panic!("{why}"));
 }

@@ -1,4 +1,5 @@
-//! Rays, transforms, and the rounding rules they obey: what is true of numbers, rays and maps when there is nothing to hit.
+//! Rays, cones and beams, transforms, and the rounding rules they obey: what is true of numbers, rays and maps when
+//! there is nothing to hit.
 //!
 //! # Conventions
 //!
@@ -35,15 +36,29 @@
 pub mod expansion;
 
 mod axis;
+mod beam;
+mod cone;
+mod differential;
+mod direction;
+mod invert;
+mod motion;
+mod orient;
+mod parts;
 mod ray;
 mod real;
 mod round;
 mod transform;
 
 pub use axis::Axis;
+pub use beam::{Beam, BeamError};
+pub use cone::{Cone, ConeError};
+pub use differential::{Footprint, RayDifferential};
+pub use direction::{angle_between, unit};
 /// The vector library this workspace uses, so that users never meet two versions of it.
 pub use glam;
+pub use motion::{Motion, Path};
+pub use parts::Parts;
 pub use ray::Ray;
 pub use real::{Real, Vector};
-pub use round::{f32_above, f32_below, gamma};
+pub use round::{difference_of_products, f32_above, f32_below, gamma};
 pub use transform::{Transform, TransformError};

@@ -9,9 +9,8 @@ use core::fmt;
 use core::ops::ControlFlow;
 use hostile::{all_rays, sample};
 use rt_accel::{
-    Aggregate, Bounded, BuildError, Counts, Exhaustive, Geometry, Hit, Leaf, Primitive, Refit, Structure,
+    Aggregate, Bounded, BuildError, Counts, Exhaustive, Geometry, Hit, Primitive, Refit, Structure,
 };
-use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real, Vector};
 use std::collections::HashSet;
@@ -120,15 +119,35 @@ pub fn conform<S: Structure, R: Real, G: Geometry<R>>(
 where
     G::At: fmt::Debug,
 {
+    conform_all::<S, R, G>(name, geometry, core::slice::from_ref(params), rays)
+}
+
+/// [`conform`] for several sets of parameters, in the time of little more than one: the exhaustive answers are found once.
+///
+/// # Errors
+///
+/// The first [`Failure`].
+pub fn conform_all<S: Structure, R: Real, G: Geometry<R>>(
+    name: &str,
+    geometry: &G,
+    params: &[S::Params],
+    rays: &[Ray<R>],
+) -> Result<(), Failure>
+where
+    G::At: fmt::Debug,
+{
     let trial = Trial::<S> { name, marker: core::marker::PhantomData };
-    trial.watched(geometry, params)?;
-    let mine = trial.built(Aggregate::<S, _>::build(geometry, params))?;
-    let truth = trial.built(Aggregate::<Exhaustive, _>::build(geometry, &()))?;
-    trial.shape(geometry, mine.structure(), truth.structure())?;
-    let again = trial.built(S::build(geometry, params))?;
-    trial.same_shape(mine.structure(), &again)?;
-    let again = Aggregate::<S, _>::build(geometry, params);
-    trial.answers(&mine, &truth, &trial.built(again)?, &all_rays(geometry, rays))
+    let exhaustive = trial.built(Aggregate::<Exhaustive, _>::build(geometry, &()))?;
+    let truth = Truth::of(&exhaustive, &all_rays(geometry, rays));
+    for params in params {
+        trial.watched(geometry, params)?;
+        let mine = trial.built(Aggregate::<S, _>::build(geometry, params))?;
+        trial.shape(geometry, mine.structure(), exhaustive.structure())?;
+        let again = trial.built(Aggregate::<S, _>::build(geometry, params))?;
+        trial.same_shape(mine.structure(), again.structure())?;
+        trial.answers(&mine, &truth, &again)?;
+    }
+    Ok(())
 }
 
 /// Builds `S` over `before`, refits it to `after`, and compares all it then says with [`Exhaustive`] over `after`.
@@ -158,7 +177,7 @@ where
     let truth = trial.built(Aggregate::<Exhaustive, _>::build(after, &()))?;
     trial.shape(after, mine.structure(), truth.structure())?;
     trial.same_shape(mine.structure(), again.structure())?;
-    trial.answers(&mine, &truth, &again, &all_rays(after, rays))
+    trial.answers(&mine, &Truth::of(&truth, &all_rays(after, rays)), &again)
 }
 
 /// The same ray, as an expression that makes it again bit for bit.
@@ -312,58 +331,75 @@ impl<S: Structure> Trial<'_, S> {
     fn answers<R: Real, G: Geometry<R>>(
         &self,
         mine: &Aggregate<S, &G>,
-        truth: &Aggregate<Exhaustive, &G>,
+        truth: &Truth<R>,
         again: &Aggregate<S, &G>,
-        rays: &[Ray<R>],
     ) -> Result<(), Failure>
     where
         G::At: fmt::Debug,
     {
-        // The rays themselves first, then the first hundred hits once more from and to their ends.
-        let mut asked = rays.to_vec();
-        for (ray, hit) in rays.iter().filter_map(|ray| Some((ray, truth.intersect(ray)?))).take(100) {
-            let (t, before, after) = (hit.t, hit.t.next_down(), hit.t.next_up());
-            let ends = [(t, t), (ray.t_min, t), (t, ray.t_max), (ray.t_min, before), (after, ray.t_max)];
-            asked.extend(ends.map(|(t_min, t_max)| ray.between(t_min, t_max)));
-            asked.push(ray.between(before, after));
-        }
+        let asked = &truth.asked;
         let mut closest = vec![None; asked.len() + 1];
         let mut any = vec![false; asked.len() + 1];
-        mine.intersect_many(&asked, &mut closest);
-        mine.intersect_p_many(&asked, &mut any);
+        mine.intersect_many(asked, &mut closest);
+        mine.intersect_p_many(asked, &mut any);
         if closest.last().is_some_and(Option::is_some) || any.last() == Some(&true) {
             return self.fail(Check::Many, "wrote past the last ray".to_string());
         }
         for (i, ray) in asked.iter().enumerate() {
-            let expected = text(&truth.intersect(ray));
+            let expected = truth.closest[i].as_str();
             let hit = expected != text(&None::<Hit<G::At, R>>);
-            self.equal(Check::Closest, ray, &text(&mine.intersect(ray)), &expected)?;
+            self.equal(Check::Closest, ray, &text(&mine.intersect(ray)), expected)?;
             self.equal(Check::Any, ray, flag(mine.intersect_p(ray)), flag(hit))?;
-            self.equal(Check::Many, ray, &text(&closest[i]), &expected)?;
+            self.equal(Check::Many, ray, &text(&closest[i]), expected)?;
             self.equal(Check::Many, ray, flag(any[i]), flag(hit))?;
-            if i >= rays.len() {
-                continue;
-            }
-            let all = all_hits(truth, ray);
-            self.equal(Check::All, ray, &all_hits(mine, ray), &all)?;
+            let Some(all) = truth.all.get(i) else { continue };
+            self.equal(Check::All, ray, &all_hits(mine, ray), all)?;
             let mut heard = 0;
             let _: ControlFlow<()> = mine.all_hits(ray, &mut |_| {
                 heard += 1;
                 ControlFlow::Break(())
             });
             if heard != usize::from(!all.is_empty()) {
-                self.equal(Check::All, ray, &format!("{heard} after being told to stop"), &all)?;
+                self.equal(Check::All, ray, &format!("{heard} after being told to stop"), all)?;
             }
-            self.equal(Check::Rebuild, ray, &text(&again.intersect(ray)), &expected)?;
+            self.equal(Check::Rebuild, ray, &text(&again.intersect(ray)), expected)?;
             let mut counts = Counts::default();
-            self.equal(Check::Counted, ray, &text(&mine.intersect_counted(ray, &mut counts)), &expected)?;
+            self.equal(Check::Counted, ray, &text(&mine.intersect_counted(ray, &mut counts)), expected)?;
             let mut counts_p = Counts::default();
             self.equal(Check::Counted, ray, flag(mine.intersect_p_counted(ray, &mut counts_p)), flag(hit))?;
             if hit && (counts.leaves == 0 || counts_p.leaves == 0) {
-                self.equal(Check::Counted, ray, "a hit without a leaf", &expected)?;
+                self.equal(Check::Counted, ray, "a hit without a leaf", expected)?;
             }
         }
         Ok(())
+    }
+}
+
+/// What [`Exhaustive`] answers, as text.
+struct Truth<R: Real> {
+    /// The rays of a trial first, then the first hundred hits once more from and to their ends.
+    asked: Vec<Ray<R>>,
+    /// The closest hit of each.
+    closest: Vec<String>,
+    /// All hits of the rays of the trial.
+    all: Vec<String>,
+}
+
+impl<R: Real> Truth<R> {
+    fn of<G: Geometry<R>>(exhaustive: &Aggregate<Exhaustive, &G>, rays: &[Ray<R>]) -> Truth<R>
+    where
+        G::At: fmt::Debug,
+    {
+        let mut asked = rays.to_vec();
+        for (ray, hit) in rays.iter().filter_map(|ray| Some((ray, exhaustive.intersect(ray)?))).take(100) {
+            let (t, before, after) = (hit.t, hit.t.next_down(), hit.t.next_up());
+            let ends = [(t, t), (ray.t_min, t), (t, ray.t_max), (ray.t_min, before), (after, ray.t_max)];
+            asked.extend(ends.map(|(t_min, t_max)| ray.between(t_min, t_max)));
+            asked.push(ray.between(before, after));
+        }
+        let closest = asked.iter().map(|ray| text(&exhaustive.intersect(ray))).collect();
+        let all = rays.iter().map(|ray| all_hits(exhaustive, ray)).collect();
+        Truth { asked, closest, all }
     }
 }
 

@@ -21,14 +21,20 @@
 //! ```
 
 mod aabb;
+mod ball;
+mod plane;
 mod quadric;
 mod rational;
+mod slabs;
 mod sphere;
 mod triangle;
 
 pub use aabb::{Span, aabb};
+pub use ball::{ball_holds, ball_meets, smallest_ball};
+pub use plane::{Plane, convex, convex_met, side};
 pub use quadric::{frustum, quadratic, revolved};
 pub use rational::Rational;
+pub use slabs::{Slab, slabs, slabs_hold};
 pub use sphere::sphere;
 pub use triangle::{Closest, Corners, Root, closest, crosses, crossings, triangle};
 

@@ -13,6 +13,7 @@
 //! assert_eq!(chords, rays::uniform(1, &world, 100));
 //! ```
 
+use rt_accel::Bounded;
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real, Vector};
@@ -314,6 +315,25 @@ pub fn ambient<R: Real>(seed: u64, spots: &[Spot], per: usize, radius: R) -> Vec
 pub fn shadow<R: Real>(points: &[DVec3], light: DVec3) -> Vec<Ray<R>> {
     let rays = points.iter().map(|&point| ray::<R>(point, light - point));
     rays.map(|ray| ray.between(R::ZERO, R::nearest(1.0))).filter(Ray::is_valid).collect()
+}
+
+/// Rays that make trouble for any structure over these primitives: at `points`, such as corners and middles of edges; along axes
+/// through them; in the faces of the box around all; through all of it, and from inside. Some two hundred.
+pub fn troublesome<R: Real>(source: &dyn Bounded, points: &[DVec3]) -> Vec<Ray<R>> {
+    let finite = |b: &Aabb| b.is_valid() && b.min.is_finite() && b.max.is_finite();
+    let bounds = (0..source.prim_count() as u32).map(|prim| source.bound(prim)).filter(finite);
+    let world = bounds.fold(Aabb::EMPTY, Aabb::union);
+    if !world.is_valid() {
+        return Vec::new();
+    }
+    let some: Vec<DVec3> =
+        points.iter().copied().filter(|p| p.is_finite()).step_by(1 + points.len() / 24).collect();
+    let mut all = uniform(1, &world, 60);
+    all.extend(aimed(2, &world, &some, 2));
+    all.extend(axis_parallel(&world, &some[..some.len().min(8)]));
+    all.extend(in_faces(3, &world, 24));
+    all.extend(inside(4, &world, 24));
+    all
 }
 
 #[cfg(test)]

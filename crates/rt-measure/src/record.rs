@@ -17,7 +17,7 @@ pub enum ErrorKind {
     Wrong,
     /// The largest error of `t`, in units in the last place.
     TUlp,
-    /// Volume enclosed in vain, as a share of the enclosed thing's.
+    /// What a bounding volume encloses in vain: the share of the lines that meet it which miss the thing inside.
     Void,
     /// The root mean squared difference of images.
     Rmse,

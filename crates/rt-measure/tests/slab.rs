@@ -1,7 +1,8 @@
-//! The slab test against exact arithmetic: it may say *hit* too often, never *miss* wrongly.
+//! The slab test, of one box, two and eight, against exact arithmetic: it may say *hit* too often, never *miss* wrongly.
 
+use fearless_simd::Level;
 use proptest::prelude::*;
-use rt_bounds::{Aabb, SlabRay};
+use rt_bounds::{Aabb, BoxOctet, BoxPair, DAabb, Portable, SlabRay};
 use rt_geom::glam::{DVec3, Vec3A};
 use rt_geom::{Ray, Real, Vector};
 use rt_measure::conform::paste;
@@ -124,16 +125,36 @@ fn intervals<R: Real>(seeded: &mut Seeded, span: &Span) -> Vec<(R, R)> {
     intervals
 }
 
-/// The first wrong miss.
-fn wrong_miss<R: Real>(ray: &Ray<R>, origin: DVec3, b: &Aabb, world: &Aabb) -> Option<String> {
+/// The first wrong miss, of a test of one box or of eight.
+fn wrong_miss<R: Real>(
+    seeded: &mut Seeded,
+    ray: &Ray<R>,
+    origin: DVec3,
+    b: &Aabb,
+    world: &Aabb,
+) -> Option<String> {
     let mut shortened = SlabRay::new(&ray.between(ray.t_min, R::INFINITY), origin, world);
     shortened.shorten(ray.t_max);
     let made = SlabRay::new(ray, origin, world);
-    let missed = made.entry(b).is_none() || shortened.entry(b).is_none();
-    missed.then(|| {
-        let corner = |v: Vec3A| v.to_array().map(f32::to_bits);
-        format!("{}\n box {b:?} bits {:x?} {:x?} origin {origin}", paste(ray), corner(b.min), corner(b.max))
-    })
+    let place = seeded.below(8);
+    let mut eight = BoxOctet::new(&[*world; 8]);
+    eight.put(place, b);
+    let of_one = |slab: &SlabRay| slab.entry(b).is_none();
+    let of_eight = |slab: &SlabRay| slab.enter_eight(&eight).0 >> place & 1 == 0;
+    let missed = [&made, &shortened].map(|slab| [of_one(slab), of_eight(slab)]);
+    let corner = |v: Vec3A| v.to_array().map(f32::to_bits);
+    missed
+        .contains(&[true, true])
+        .then_some("missed")
+        .or(missed.as_flattened().contains(&true).then_some("unequal"))
+        .map(|how| {
+            format!(
+                "{how}: {}\n box {b:?} bits {:x?} {:x?} origin {origin}",
+                paste(ray),
+                corner(b.min),
+                corner(b.max)
+            )
+        })
 }
 
 /// Draws boxes and rays; returns the wrong misses and how many hits were asked about.
@@ -153,7 +174,7 @@ fn adversarial<R: Real>(seed: u64, cases: usize) -> (Vec<String>, usize) {
             // A computed hit may lie one unit in the last place before the box, and ends the ray there.
             if span.meets(t_min.into(), t_max.next_up().into()) {
                 hits += 1;
-                wrong.extend(wrong_miss(&ray, DVec3::ZERO, &b, &world));
+                wrong.extend(wrong_miss(&mut seeded, &ray, DVec3::ZERO, &b, &world));
             }
         }
     }
@@ -198,7 +219,7 @@ fn far_away<R: Real>(seed: u64, cases: usize) -> (Vec<String>, usize) {
             // A computed hit may lie one unit in the last place before the box, and ends the ray there.
             if span.meets(t_min.into(), t_max.next_up().into()) {
                 hits += 1;
-                wrong.extend(wrong_miss(&ray, origin, &b, &world));
+                wrong.extend(wrong_miss(&mut seeded, &ray, origin, &b, &world));
             }
         }
     }
@@ -253,6 +274,124 @@ fn no_wrong_miss_far_away_in_f64() {
     none_wrong(far_away::<f64>(4, 50_000), 50_000);
 }
 
+/// Which boxes are met and the bits of where, of all that are.
+type Met = [Option<u32>; 8];
+
+fn met((met, entry): (u32, [f32; 8])) -> Met {
+    let mut places = [None; 8];
+    for (i, place) in places.iter_mut().enumerate() {
+        *place = (met >> i & 1 == 1).then(|| entry[i].to_bits());
+    }
+    places
+}
+
+/// What every set of instructions of this machine says.
+fn at_every_level(slab: &SlabRay, boxes: &BoxOctet) -> Vec<(&'static str, Met)> {
+    let mut said = vec![
+        ("dispatched", met(slab.enter_eight(boxes))),
+        ("portable", met(slab.wide(Portable).enter_eight(boxes))),
+    ];
+    let level = Level::new();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        said.extend(level.as_sse2().map(|lanes| ("sse2", met(slab.wide(lanes).enter_eight(boxes)))));
+        said.extend(level.as_sse4_2().map(|lanes| ("sse4.2", met(slab.wide(lanes).enter_eight(boxes)))));
+        said.extend(level.as_avx2().map(|lanes| ("avx2", met(slab.wide(lanes).enter_eight(boxes)))));
+        said.extend(level.as_avx512().map(|lanes| ("avx512", met(slab.wide(lanes).enter_eight(boxes)))));
+    }
+    #[cfg(target_arch = "aarch64")]
+    said.extend(level.as_neon().map(|lanes| ("neon", met(slab.wide(lanes).enter_eight(boxes)))));
+    said
+}
+
+/// Draws rays and eight boxes each; returns how many boxes were met.
+fn eight_like_one<R: Real>(seed: u64, cases: usize) -> usize {
+    let mut seeded = Seeded::new(seed);
+    let mut hits = 0;
+    for _ in 0..cases {
+        let boxes: Vec<Aabb> =
+            (0..8).map(|_| if seeded.below(12) == 0 { Aabb::EMPTY } else { a_box(&mut seeded) }).collect();
+        let world = boxes.iter().fold(Aabb::EMPTY, |world, b| world.union(*b));
+        let aim = boxes[seeded.below(8)];
+        let mut ray: Ray<R> = a_ray(&mut seeded, &aim);
+        let (x, y) = (R::nearest(coordinate(&mut seeded) as f64), R::nearest(coordinate(&mut seeded) as f64));
+        match seeded.below(4) {
+            0 => ray = ray.between(if x < y { x } else { y }, if x < y { y } else { x }),
+            1 => ray = ray.between(-R::INFINITY, R::INFINITY),
+            _ => (),
+        }
+        if !ray.is_valid() {
+            continue;
+        }
+        let slab = SlabRay::new(&ray, DVec3::ZERO, &world);
+        let mut one: Met = [None; 8];
+        for (place, b) in one.iter_mut().zip(&boxes) {
+            *place = slab.entry(b).map(f32::to_bits);
+        }
+        for pair in 0..4 {
+            let two = slab.enter_pair(&BoxPair::new(&boxes[2 * pair], &boxes[2 * pair + 1]));
+            let (met, entry) = two;
+            for side in 0..2 {
+                let said = (met >> side & 1 == 1).then(|| entry[side].to_bits());
+                assert_eq!(said, one[2 * pair + side], "{} {:?}", paste(&ray), boxes[2 * pair + side]);
+            }
+        }
+        hits += one.iter().flatten().count();
+        for (level, eight) in at_every_level(&slab, &BoxOctet::new(&boxes)) {
+            assert_eq!(eight, one, "{level}: {} {boxes:?}", paste(&ray));
+        }
+    }
+    hits
+}
+
+#[test]
+fn eight_boxes_answer_as_one_at_every_level() {
+    let hits = [eight_like_one::<f32>(5, 60_000), eight_like_one::<f64>(6, 60_000)];
+    assert!(hits.iter().all(|&hits| hits > 40_000), "only {hits:?} boxes met");
+}
+
+#[test]
+fn boxes_in_f64_are_met_exactly() {
+    let mut seeded = Seeded::new(7);
+    let (mut hits, mut asked) = (0, 0);
+    for _ in 0..60_000 {
+        let b = a_box(&mut seeded);
+        let ray: Ray<f64> = a_ray(&mut seeded, &b);
+        // Neighbours in f64 of what f32 can say.
+        let step = |x: f64, up: usize| [x, x.next_up(), x.next_down()][up % 3];
+        let [x, y, z] = ray.origin.to_array();
+        let origin = DVec3::new(step(x, seeded.below(9)), step(y, seeded.below(9)), step(z, seeded.below(9)));
+        let ray = Ray { origin, ..ray };
+        let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+        let moderate =
+            |v: DVec3| v.to_array().iter().all(|x| *x == 0.0 || (1e-130..1e130).contains(&x.abs()));
+        if !ray.is_valid() || !b.is_valid() || !moderate(ray.origin) || !moderate(ray.dir) {
+            continue;
+        }
+        let Some(span) = span_of(&ray, min, max) else {
+            assert_eq!(DAabb { min, max }.span(&ray.between(f64::NEG_INFINITY, f64::INFINITY)), None);
+            continue;
+        };
+        for (t_min, t_max) in intervals(&mut seeded, &span) {
+            if [t_min, t_max].iter().any(|t: &f64| *t != 0.0 && t.abs() < 1e-130) {
+                continue;
+            }
+            let met = span.meets(t_min, t_max);
+            let said = DAabb { min, max }.span(&ray.between(t_min, t_max));
+            asked += 1;
+            hits += usize::from(met);
+            assert_eq!(said.is_some(), met, "{} {b:?} {t_min:e} {t_max:e}", paste(&ray));
+            let Some([near, far]) = said else { continue };
+            let inside = |end: &exact::Rational| {
+                let end: f64 = end.nearest();
+                near.next_down() <= end.max(t_min) && end.min(t_max) <= far.next_up()
+            };
+            assert!(span.enter.as_ref().is_none_or(inside) && span.exit.as_ref().is_none_or(inside));
+        }
+    }
+    assert!(hits > 100_000 && asked > 5 * hits / 4, "{hits} of {asked}");
+}
+
 proptest! {
     #[test]
     fn no_wrong_miss_at_all(corners: [[f32; 3]; 2], o: [f32; 3], d: [f32; 3], t_min: f32) {
@@ -263,7 +402,7 @@ proptest! {
         prop_assume!(ray.is_valid() && b.is_valid());
         let span = span_of(&ray, b.min.as_dvec3(), b.max.as_dvec3());
         if span.is_some_and(|span| span.meets(t_min.into(), f64::INFINITY)) {
-            let wrong = wrong_miss(&ray, DVec3::ZERO, &b, &b);
+            let wrong = wrong_miss(&mut Seeded::new(1), &ray, DVec3::ZERO, &b, &b);
             prop_assert!(wrong.is_none(), "{}", wrong.unwrap_or_default());
         }
     }

@@ -19,6 +19,17 @@ impl<V: Real> Trial<V> {
     pub(crate) fn new(name: impl Into<String>, mesh: TriangleMesh<V>) -> Trial<V> {
         Trial { name: name.into(), mesh }
     }
+
+    /// Where to aim: at its corners, and at the middles of some edges.
+    pub fn points(&self) -> Vec<DVec3> {
+        let widen = |v: &[V; 3]| DVec3::from_array(v.map(Into::into));
+        let mut points: Vec<DVec3> = self.mesh.vertices().iter().map(widen).collect();
+        for corners in self.mesh.triangles().iter().step_by(7) {
+            let [a, b, _] = corners.map(|i| points[i as usize]);
+            points.push((a + b) * 0.5);
+        }
+        points
+    }
 }
 
 /// A closed surface, every edge of which belongs to two triangles that run along it in opposite directions; and a point strictly

@@ -34,6 +34,7 @@
 //! [`Uv`] is `f32` for rays of either precision: it orders nothing and decides nothing, and [`Surface`] is computed afresh in
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.
 
+mod clip;
 mod mesh;
 mod polygon;
 mod quadric;

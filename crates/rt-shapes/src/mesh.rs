@@ -1,12 +1,13 @@
 //! [`TriangleMesh`]: indexed triangles.
 
+use crate::clip::clipped_bound;
 use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Bounded, Geometry, Hit};
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::{DVec2, DVec3, Vec3A};
-use rt_geom::{Ray, Real, gamma};
+use rt_geom::{Ray, Real, Transform, gamma};
 
 /// Triangles over shared vertices, in world space, of `f32` or `f64` coordinates.
 ///
@@ -205,6 +206,19 @@ impl<V: Real> Bounded for TriangleMesh<V> {
             return Aabb::new(Vec3A::NAN, Vec3A::NAN);
         }
         Aabb::from_f64(a.min(b).min(c), a.max(b).max(c), origin)
+    }
+
+    fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
+        match self.get(prim) {
+            Some(triangle) if triangle.corners.iter().all(|c| c.is_finite()) => {
+                clipped_bound(triangle.corners, cell, origin)
+            }
+            _ => Aabb::EMPTY,
+        }
+    }
+
+    fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
+        DAabb::around_carried(self.get(prim).map_or([DVec3::NAN; 3], |triangle| triangle.corners), map)
     }
 }
 

@@ -5,9 +5,9 @@ use crate::{Partials, Shape, Surface, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Hit, Primitive, WorldBound};
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::DVec3;
-use rt_geom::{Axis, Ray, Real};
+use rt_geom::{Axis, Ray, Real, Transform};
 
 /// A planar polygon, convex or concave, in world space, kept in `f64`; answers rays of both precisions.
 ///
@@ -143,6 +143,9 @@ impl WorldBound for Polygon {
         let min = corners().fold(DVec3::INFINITY, DVec3::min);
         let max = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
         Aabb::from_f64(min, max, origin)
+    }
+    fn bound_under(&self, map: &Transform) -> DAabb {
+        DAabb::around_carried(self.triangles.iter().flat_map(|t| t.corners), map)
     }
 }
 

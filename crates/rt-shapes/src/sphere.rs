@@ -4,10 +4,10 @@ use crate::{Partials, Shape, Surface, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Hit, Primitive, WorldBound};
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::expansion::{DoubleDouble, Expansion, two_sum};
 use rt_geom::glam::{DVec2, DVec3};
-use rt_geom::{Ray, Real, Vector, gamma};
+use rt_geom::{Ray, Real, Transform, Vector, gamma};
 
 const U: f64 = f64::EPSILON / 2.0;
 /// A Newton step this small leaves an error of its square: less than a rounding.
@@ -214,6 +214,15 @@ impl WorldBound for Sphere {
         let min = DVec3::from_array(self.center.to_array().map(below));
         let max = -DVec3::from_array((-self.center).to_array().map(below));
         Aabb::from_f64(min, max, origin)
+    }
+
+    /// The box of the ellipsoid that the map makes of the sphere: it reaches as far as the rows of the map are long.
+    fn bound_under(&self, map: &Transform) -> DAabb {
+        let (rows, center) = (map.linear().transpose(), map.point(self.center));
+        let reach =
+            DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length()) * self.radius;
+        let here = DAabb { min: self.center - self.radius, max: self.center + self.radius };
+        DAabb { min: center - reach, max: center + reach }.room(here, map)
     }
 }
 

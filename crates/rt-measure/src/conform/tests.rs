@@ -1,7 +1,9 @@
 use super::*;
 use crate::rays;
 use core::sync::atomic::{AtomicU32, Ordering};
+use rt_accel::Leaf;
 use rt_accel::{Invalid, Visitor, Watch, WorldBound};
+use rt_bounds::Aabb;
 use rt_geom::glam::Vec3A;
 
 /// A horizontal square.
