@@ -94,7 +94,6 @@ fn the_others_take_the_rays_they_are_known_for() {
     agree::<f64>("tetra", 5);
     agree::<f64>("shells", 5);
     agree::<f64>("sombrero", 1);
-    agree::<f64>("teapot", 6);
 }
 
 #[test]

@@ -240,6 +240,29 @@ mod tests {
         assert!(corners.iter().all(|&c| polygon.intersect_p(&Ray::new(c - DVec3::Z, DVec3::Z))));
     }
 
+    /// There the error of a point along the normal is zero, and the next number after zero is lost in products.
+    #[test]
+    fn rays_that_leave_a_plane_through_zero_do_not_meet_it() {
+        let square = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.6), (0.0, 0.6)];
+        for tiny in [1.0, 1e-3, 1e-12] {
+            let polygon = Polygon::new(&square.map(|(x, y)| DVec3::new(x, y, 0.0) * tiny)).unwrap();
+            for (x, y) in [(0.1, 0.2), (0.3, 0.3), (0.55, 0.01)] {
+                for z in [1.0, -1.0] {
+                    let ray = Ray::new(DVec3::new(x, y, z) * tiny, DVec3::new(0.01, 0.02, -z));
+                    let hit = polygon.intersect(&ray).unwrap();
+                    let surface = Shape::<f64>::surface(&polygon, &ray, &hit);
+                    for dir in [DVec3::new(0.3, 0.1, 1.0), DVec3::new(0.2, 0.9, -0.1)] {
+                        assert!(!polygon.intersect_p(&surface.spawn(dir)), "{tiny} {x} {y} {z} {dir}");
+                        assert!(
+                            !polygon.intersect_p(&surface.spawn(dir.as_vec3a())),
+                            "{tiny} {x} {y} {z} {dir}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
     fn what_is_no_polygon_says_why() {
         assert_eq!(Polygon::new(&[DVec3::ZERO, DVec3::X]), Err(PolygonError::TooFew(2)));
