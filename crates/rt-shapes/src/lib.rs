@@ -1,4 +1,4 @@
-//! Things with surfaces: triangle meshes, spheres, polygons.
+//! Things with surfaces: triangle meshes, spheres, polygons, quadrics.
 //!
 //! Whether a ray hits is decided exactly: by a filter in `f64`, then with twice the digits or exact sums for what the filter
 //! leaves open. So there are no leaks between triangles, and every structure, at any width and on any CPU, finds the same hits.
@@ -29,7 +29,8 @@
 //!
 //! This crate knows no structure. The `t` of a triangle is the exact distance, correctly rounded to the ray's precision, whatever
 //! the condition of the problem; so neighbours that are met at a shared vertex are met at one `t`. That of a sphere is within
-//! `2^-33` of half a unit in the last place.
+//! `2^-33` of half a unit in the last place. Of a [`Quadric`] or [`Frustum`] see there: its decisions have twice the digits of `f64`, and
+//! what these leave open is a hit.
 //!
 //! [`Uv`] is `f32` for rays of either precision: it orders nothing and decides nothing, and [`Surface`] is computed afresh in
 //! `f64`, so a second precision of it would be carried by everyone and read by nobody.
@@ -44,7 +45,7 @@ mod triangle;
 
 pub use mesh::{MeshError, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
-pub use quadric::{Frustum, QuadricError, Root};
+pub use quadric::{Disk, Frustum, Quadric, QuadricError, Root};
 pub use sphere::{Sphere, SphereError};
 pub use surface::{Partials, Shape, Surface, Surfaced, Uv};
 pub use triangle::{Meeting, Triangle, moller_trumbore};

@@ -1,12 +1,13 @@
 //! [`Form`]: a surface as the zeros of a signed sum of squares, in whatever digits are asked for.
 
-use core::ops::{Add, Mul, Sub};
+use super::sweep::Sweep;
+use core::ops::{Add, Div, Mul, Sub};
 use rt_geom::expansion::DoubleDouble;
 use rt_geom::glam::DVec3;
 
 /// `f64`, or twice its digits.
 pub(super) trait Number:
-    Copy + From<f64> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+    Copy + From<f64> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// Bound on the relative error of one operation (of a sum: relative to its terms).
     const U: f64;
@@ -102,7 +103,9 @@ pub(super) trait Form: Sized {
     /// The vector of the linear function `sum of weight_i squares_i + axial`: the transpose of [`Form::linear`].
     fn transposed(&self, weights: [f64; 4], axial: f64) -> DVec3;
     /// Beyond its axial limits the surface may be cut by planes through the axis.
-    fn sweep(&self) -> Option<&super::sweep::Sweep>;
+    fn sweep(&self) -> Option<&Sweep>;
+    /// Whether the sweep turns with the direction of the last two squares, instead of starting from the first two's first axis.
+    fn twisted(&self) -> bool;
     /// All lengths times `by`, a power of two.
     fn scaled(&self, by: f64) -> Self;
 

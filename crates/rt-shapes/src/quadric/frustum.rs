@@ -3,7 +3,7 @@
 use super::form::{Extent, Form, Number, Terms};
 use super::solve;
 use super::sweep::Sweep;
-use super::{QuadricError, Root, part, surface};
+use super::{LARGEST, QuadricError, Root, surface};
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::{PI, TAU};
 use core::ops::ControlFlow;
@@ -54,15 +54,15 @@ impl Frustum {
     ///
     /// # Errors
     ///
-    /// When a point is not finite or both are the same, a radius is negative or not finite, or both are zero.
+    /// When a point is not finite or both are the same, a radius is negative or NaN, both are zero, or anything exceeds `1e290`.
     pub fn new(base: DVec3, r0: f64, top: DVec3, r1: f64) -> Result<Frustum, QuadricError> {
         for p in [base, top] {
-            if !p.is_finite() {
+            if !(p.abs().max_element() <= LARGEST && p.is_finite()) {
                 return Err(QuadricError::Point(p));
             }
         }
         for r in [r0, r1] {
-            if !(r >= 0.0 && r.is_finite()) {
+            if !(0.0..=LARGEST).contains(&r) {
                 return Err(QuadricError::Radius(r));
             }
         }
@@ -71,7 +71,7 @@ impl Frustum {
         }
         let unit = match (top - base).abs().max_element() {
             0.0 => return Err(QuadricError::NoAxis(base)),
-            length if !length.is_finite() => return Err(QuadricError::Point(top)),
+            length if length > LARGEST => return Err(QuadricError::Point(top)),
             length => f64::from_bits((length.to_bits() >> 52).clamp(30, 2000) << 52),
         };
         // Exact: the differences have two parts, and the unit is a power of two.
@@ -91,7 +91,7 @@ impl Frustum {
             constant: length.value() * r0,
             limits: [wide(0.0), rise],
         };
-        let grows = length * DoubleDouble::difference(r1, r0) / rise;
+        let grows = length * DoubleDouble::difference(r1 / unit, r0 / unit) / square;
         let gain = extent.gain.max(3.0 * grows.value().abs() * length.value());
         Ok(Frustum {
             ends: [base, top],
@@ -208,6 +208,10 @@ impl Form for Frustum {
     fn sweep(&self) -> Option<&Sweep> {
         None
     }
+    #[inline(always)]
+    fn twisted(&self) -> bool {
+        false
+    }
     fn scaled(&self, by: f64) -> Frustum {
         let times = |x: DoubleDouble| x * DoubleDouble::from(by);
         Frustum {
@@ -249,7 +253,7 @@ impl<R: Real> Primitive<R> for Frustum {
 
     #[inline]
     fn intersect(&self, ray: &Ray<R>) -> Option<Hit<Uv, R>> {
-        part::closest(self, ray)
+        solve::closest(self, ray)
     }
     fn all_hits(&self, ray: &Ray<R>, each: &mut dyn FnMut(Hit<Uv, R>) -> ControlFlow<()>) -> ControlFlow<()> {
         solve::hits(self, ray, |t| each(Hit { t, at: Uv::default() }))

@@ -2,7 +2,9 @@
 
 use super::Root;
 use super::form::{Coefficients, Extent, Form, Number, offset, signed, size, uncertain};
+use crate::Uv;
 use core::ops::ControlFlow;
+use rt_accel::Hit;
 use rt_geom::expansion::DoubleDouble;
 use rt_geom::glam::{DVec2, DVec3};
 use rt_geom::{Ray, Real, Vector};
@@ -46,17 +48,26 @@ pub(super) fn hits<F: Form, R: Real>(
     let Some(found) = candidates(form, o, d) else { return ControlFlow::Continue(()) };
     let mut last = f64::NEG_INFINITY;
     for candidate in found.into_iter().flatten() {
-        // In order, whatever the digits of either; and two that cannot be told apart are one.
-        if let Some(root) = settle::<F, R>(form, o, d, candidate, ray.t_min.into(), ray.t_max.reach())
-            && root.t > last
-        {
-            last = root.t;
-            if let Some(t) = ray.admit(root.t) {
+        if let Some(root) = settle::<F, R>(form, o, d, candidate, ray.t_min.into(), ray.t_max.reach()) {
+            // In order, whatever the digits of either.
+            last = root.t.max(last);
+            if let Some(t) = ray.admit(last) {
                 each(t)?;
             }
         }
     }
     ControlFlow::Continue(())
+}
+
+/// The first hit.
+#[inline(always)]
+pub(super) fn closest<F: Form, R: Real>(form: &F, ray: &Ray<R>) -> Option<Hit<Uv, R>> {
+    let mut first = None;
+    let _ = hits(form, ray, |t| {
+        first = Some(Hit { t, at: Uv::default() });
+        ControlFlow::Break(())
+    });
+    first
 }
 
 /// Both roots on the surface, whatever their sign, with their errors.
@@ -73,7 +84,9 @@ fn roots_in_range<F: Form>(form: &F, o: DVec3, d: DVec3) -> [Option<Root>; 2] {
     let all = f64::INFINITY;
     let found = candidates(form, o, d).unwrap_or_default();
     let [near, far] = found.map(|c| settle::<F, f64>(form, o, d, c?, -all, all));
-    if near.map(|root| root.t) == far.map(|root| root.t) { [near, None] } else { [near, far] }
+    // In order, whatever the digits of either.
+    let least = near.map_or(-all, |root| root.t);
+    [near, far.map(|far| Root { t: far.t.max(least), error: far.error + (least - far.t).max(0.0) })]
 }
 
 /// [`roots`] for sizes whose products leave the range of `f64`: the same surface and line, in other units.
@@ -180,7 +193,8 @@ fn candidates_wide<F: Form>(
         return None;
     }
     let zero = DoubleDouble::from(0.0);
-    let root = if discriminant.value() > 0.0 { discriminant.sqrt() } else { zero };
+    // Only what is certainly two is two.
+    let root = if discriminant.value() > doubt { discriminant.sqrt() } else { zero };
     let q = if b < 0.0 { root - k.b } else { zero - k.b - root };
     // By how much the root of the discriminant may be off.
     let blur = if root.value() > 0.0 { (doubt / root.value()).min(doubt.sqrt()) } else { doubt.sqrt() };
@@ -193,9 +207,12 @@ fn candidates_wide<F: Form>(
         Candidate { t: at, slack: 2.0 * own + U * at.abs(), fine: true }
     };
     let near = |c: &Candidate| (c.t - t).abs() <= 2.0 * span + c.slack;
+    if root.value() == 0.0 && a.abs() > off[0] {
+        return Some([Some(candidate(q / k.a)), None]);
+    }
     if q.value() == 0.0 {
-        // All of the line lies in the surface, which it then does not cross; or it touches.
-        return (a.abs() > off[0]).then(|| [Some(candidate(zero)), None]);
+        // All of the line lies in the surface, which it then does not cross.
+        return None;
     }
     let second = if a.abs() > off[0] { Some(candidate(q / k.a)).filter(near) } else { None };
     let first = Some(candidate(k.c / q)).filter(near);
@@ -272,13 +289,15 @@ impl Window {
             return false;
         }
         self.unsure = true;
-        let zero = (-value / slope).max(self.from).min(self.to);
+        // Where it is 0, as generous as its bound.
+        let zero = -(value + off) / slope;
         if slope > 0.0 {
-            self.from = zero;
+            self.from = self.from.max(zero);
         } else if slope < 0.0 {
-            self.to = zero;
+            self.to = self.to.min(zero);
         }
-        true
+        // Each limit may be kept, but not always all of them by the same root.
+        self.from <= self.to
     }
 }
 
@@ -299,9 +318,20 @@ fn verdict<F: Form, T: Number>(form: &F, o: DVec3, d: DVec3, t: f64, error: f64)
         return Verdict::Outside;
     }
     if let Some(sweep) = form.sweep() {
-        let cross = |e: DVec2, p: &[T; 4]| (T::from(e.x) * p[1] - T::from(e.y) * p[0]).value();
+        // The point beside the direction that angles count from, how it moves, and what it is off by.
+        let (p, moves, off) = if form.twisted() {
+            let (a, b) = (form.at(w).squares, v.squares);
+            let relative = |g: &[T; 4], p: &[T; 4]| [g[2] * p[0] + g[3] * p[1], g[2] * p[1] - g[3] * p[0]];
+            let ([x0, y0], [x1, y1]) = (relative(&a, &b), relative(&b, &a));
+            let bent = relative(&b, &b).map(|x| x.value().abs() * error * error);
+            let total: f64 = a.iter().map(|x| x.value().abs()).sum();
+            (relative(&a, &a), [x0 + x1, y0 + y1], 2.0 * (eta * (total + 2.0 * eta) + bent[0] + bent[1]))
+        } else {
+            ([u.squares[0], u.squares[1]], [v.squares[0], v.squares[1]], 2.0 * eta)
+        };
+        let cross = |e: DVec2, p: [T; 2]| (T::from(e.x) * p[1] - T::from(e.y) * p[0]).value();
         let side = |window: &mut Window, e: DVec2, sign: f64| {
-            window.admits(sign * cross(e, &u.squares), 4.0 * eta, sign * cross(e, &v.squares))
+            window.admits(sign * cross(e, p), 2.0 * off, sign * cross(e, moves))
         };
         let [from, to] = sweep.ends;
         if sweep.reflex {
@@ -357,13 +387,18 @@ fn settle<F: Form, R: Real>(
         _ if fine => Root { t, error: slack },
         _ => closest_wide(form, o, d, t, slack),
     };
+    // From a point of the surface, as far as can be told, the distance is none.
+    if root.t.abs() <= root.error {
+        root.t = 0.0;
+        root.error *= 2.0;
+    }
     if rough != Verdict::Inside || root.error > slack {
         match verdict::<F, DoubleDouble>(form, o, d, root.t, root.error) {
             Verdict::Inside => {}
             Verdict::Outside => return None,
             Verdict::Unsure(shift) => {
                 root.t += shift;
-                root.error += shift.abs();
+                root.error += shift.abs() + U * root.t.abs();
             }
         }
     }
