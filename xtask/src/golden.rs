@@ -36,7 +36,13 @@ const SIDE: u32 = 128;
 fn size(scene: &str) -> Option<u32> {
     match scene {
         "balls" => Some(2),
+        "gears" | "jacks" | "rings" | "shells" => Some(2),
+        "lattice" | "mount" => Some(4),
+        "teapot" => Some(6),
         "tetra" => Some(4),
+        "tree" => Some(8),
+        "interior" => Some(1),
+        "terrain" => Some(40),
         "stadium" => Some(2),
         "soup" | "clusters" | "sticks" | "needles" | "rubble" => Some(1000),
         "icosphere" | "crumpled" => Some(3),

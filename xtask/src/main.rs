@@ -12,6 +12,7 @@ mod failure;
 mod golden;
 mod output;
 mod render;
+mod spd;
 mod stability;
 mod stage;
 mod structures;
@@ -34,6 +35,7 @@ Examples:
   cargo xtask render tetra --explain    another scene, and what it leaves out
   cargo xtask stability --rays 10000000 stiff and extreme cases against exact arithmetic
   cargo xtask bench --quick             what rays cost, in less than two minutes
+  cargo xtask spd                       do Haines' scenes take the rays they are known for?
   cargo xtask golden                    has any reference picture changed?
   cargo xtask ci                        everything a server checks
 
@@ -45,6 +47,8 @@ enum Task {
     Render(render::Args),
     /// Compare small pictures of every structure with the reference ones, bit for bit.
     Golden(golden::Args),
+    /// Count the rays of Haines' scenes, and compare with what is known of them.
+    Spd(spd::Args),
     /// Measure what rays cost, and how wrong the answers are.
     Bench(bench::Args),
     /// Ask about stiff and extreme cases, and judge by exact arithmetic.
@@ -58,6 +62,7 @@ enum Task {
 fn main() -> ExitCode {
     let result = match Args::parse().task {
         Task::Render(args) => render::run(&args),
+        Task::Spd(args) => spd::run(&args),
         Task::Golden(args) => golden::run(&args),
         Task::Bench(args) => bench::run(&args),
         Task::Stability(args) => stability::run(&args),

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::output::{Json, Progress, catch_interrupts, interrupted, say, thousands, write_whole};
-use crate::stage::{Built, Precision, Stage, load};
+use crate::stage::{Bits, Built, Precision, Stage, load};
 use crate::structures;
 use clap::ValueEnum;
 use rt_accel::{Counts, Member};
@@ -21,8 +21,8 @@ use std::time::{Duration, Instant};
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Args {
-    /// The scene: a name, or a file that ends in .obj.
-    #[arg(default_value = "balls", value_name = "SCENE|FILE.obj")]
+    /// The scene: a name, or a file that ends in .obj or .nff.
+    #[arg(default_value = "balls", value_name = "SCENE|FILE")]
     scene: String,
     /// The structure over the scene.
     #[arg(long, value_name = "STRUCTURE", default_value = DEFAULT_STRUCTURE)]
@@ -68,12 +68,6 @@ Examples:
   cargo xtask render bunny.obj -o bunny.png --force  a mesh, over an older picture
   cargo xtask render balls --heat nodes              what each eye ray costs
   cargo xtask render --precision f64 --format json   figures for a program";
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Bits {
-    F32,
-    F64,
-}
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Heat {

@@ -31,19 +31,32 @@ pub(crate) struct Built {
 pub(crate) fn load(name: &str, size: Option<u32>) -> Result<Scene, Failure> {
     let path = Path::new(name);
     let suffix = path.extension().map(|e| e.to_ascii_lowercase());
-    if suffix.is_some_and(|e| e == "obj") {
+    let suffix = suffix.as_deref().and_then(|e| e.to_str());
+    if let Some(suffix @ ("obj" | "nff")) = suffix {
         if size.is_some() {
             return Err(Failure::Usage("--spd-size is for generated scenes, not for files".into()));
         }
-        // The error names the file.
-        return rt_scenes::obj::load(path).map_err(|e| Failure::File(e.to_string()));
+        // The errors name the file.
+        return match suffix {
+            "obj" => rt_scenes::obj::load(path).map_err(|e| Failure::File(e.to_string())),
+            _ => rt_scenes::nff::load(path).map_err(|e| Failure::File(e.to_string())),
+        };
     }
     if name.contains(['/', '\\', '.']) {
-        let why =
-            format!("{name}: only .obj files can be read; scenes are {}", rt_scenes::names().join(", "));
+        let why = format!(
+            "{name}: only .obj and .nff files can be read; scenes are {}",
+            rt_scenes::names().join(", ")
+        );
         return Err(Failure::Usage(why));
     }
     rt_scenes::by_name(name, size).map_err(|e| Failure::Usage(e.to_string()))
+}
+
+/// A precision of rays, by name.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+pub(crate) enum Bits {
+    F32,
+    F64,
 }
 
 /// A precision of rays, and which scenes they can be shot into.

@@ -43,23 +43,27 @@ fn on_every_trial_in_f64() {
 }
 
 #[test]
-fn on_spheres_and_polygons() {
-    let scene = rt_scenes::by_name("balls", Some(2)).unwrap();
-    let SceneGeometry::Solids(solids) = scene.geometry else { panic!("balls are solids") };
-    let points: Vec<DVec3> = solids
-        .iter()
-        .filter_map(|solid| match solid {
-            Solid::Sphere(ball) => Some(ball.center() + DVec3::X * ball.radius()),
-            _ => None,
-        })
-        .collect();
-    for params in params() {
-        let rays = troublesome::<f32>(&solids, &points);
-        conform::conform::<Bvh, f32, _>("balls 2", &solids, &params, &rays)
-            .unwrap_or_else(|why| panic!("{why}"));
-        let rays = troublesome::<f64>(&solids, &points);
-        conform::conform::<Bvh, f64, _>("balls 2", &solids, &params, &rays)
-            .unwrap_or_else(|why| panic!("{why}"));
+fn on_solids_of_every_kind() {
+    for (name, size) in [("balls", 2), ("rings", 1), ("tree", 4), ("mount", 2), ("teapot", 1)] {
+        let scene = rt_scenes::by_name(name, Some(size)).unwrap();
+        let SceneGeometry::Solids(solids) = scene.geometry else { panic!("{name} are solids") };
+        let points: Vec<DVec3> = solids
+            .iter()
+            .filter_map(|solid| match solid {
+                Solid::Sphere(ball) => Some(ball.center() + DVec3::X * ball.radius()),
+                Solid::Frustum(frustum) => Some(frustum.ends()[0]),
+                Solid::Facet(facet) => Some(facet.corners()[0]),
+                _ => None,
+            })
+            .collect();
+        for params in params() {
+            let rays = troublesome::<f32>(&solids, &points);
+            conform::conform::<Bvh, f32, _>(name, &solids, &params, &rays)
+                .unwrap_or_else(|why| panic!("{why}"));
+            let rays = troublesome::<f64>(&solids, &points);
+            conform::conform::<Bvh, f64, _>(name, &solids, &params, &rays)
+                .unwrap_or_else(|why| panic!("{why}"));
+        }
     }
 }
 

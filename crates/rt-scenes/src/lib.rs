@@ -1,8 +1,8 @@
-//! Scenes to try ray tracing on: Haines' Standard Procedural Databases, OBJ files, random soups, a teapot in a stadium, and
-//! inputs meant to hurt.
+//! Scenes to try ray tracing on: Haines' Standard Procedural Databases, NFF and OBJ files, random soups, a teapot in a
+//! stadium, an interior, a terrain, and inputs meant to hurt.
 //!
-//! * A [`Scene`] is what a picture needs: shapes, looks, lights, a view. [`by_name`] makes one of [`names`]; [`obj::load`]
-//!   reads one.
+//! * A [`Scene`] is what a picture needs: shapes, looks, lights, a view. [`by_name`] makes one of [`names`]; [`obj::load`] and
+//!   [`nff::load`] read one.
 //! * A [`Trial`] is a small mesh with a name. [`trials`] lists what every structure must answer rightly on, [`closed_meshes`]
 //!   those that no ray from inside may leave.
 //!
@@ -21,17 +21,22 @@
 
 pub mod fine;
 pub mod hostile;
+pub mod interior;
+pub mod nff;
 pub mod obj;
 pub mod soup;
 pub mod spd;
 pub mod stadium;
+pub mod terrain;
 
+mod facet;
 mod numbers;
 mod scene;
 mod solid;
 mod teapot;
 mod trial;
 
+pub use facet::Facet;
 pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, by_name, names};
 pub use solid::Solid;
 pub use trial::{Closed, Trial, closed_meshes, fine_trials, trials};

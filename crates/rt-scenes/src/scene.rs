@@ -1,6 +1,6 @@
 //! [`Scene`]: shapes, looks, lights, a view.
 
-use crate::{Solid, fine, soup, spd, stadium};
+use crate::{Solid, fine, interior, soup, spd, stadium, terrain};
 use core::fmt;
 use rt_accel::{Bounded, WorldBound};
 use rt_bounds::Aabb;
@@ -260,8 +260,19 @@ type Maker = fn(Option<u32>) -> Result<Scene, SceneError>;
 /// All scenes, each by name.
 const SCENES: &[(&str, Maker)] = &[
     ("balls", |size| spd::balls(size.unwrap_or(4))),
+    ("gears", |size| spd::gears(size.unwrap_or(4))),
+    ("jacks", |size| spd::jacks(size.unwrap_or(3))),
+    ("lattice", |size| spd::lattice(size.unwrap_or(12))),
+    ("mount", |size| spd::mount(size.unwrap_or(6))),
+    ("rings", |size| spd::rings(size.unwrap_or(7))),
+    ("shells", |size| spd::shells(size.unwrap_or(5))),
+    ("sombrero", |size| spd::sombrero(size.unwrap_or(1))),
+    ("teapot", |size| spd::teapot(size.unwrap_or(12))),
     ("tetra", |size| spd::tetra(size.unwrap_or(6))),
+    ("tree", |size| spd::tree(size.unwrap_or(11))),
     ("stadium", |size| stadium::stadium(870.0, size.unwrap_or(12))),
+    ("interior", |size| interior::interior(size.unwrap_or(3))),
+    ("terrain", |size| terrain::terrain(size.unwrap_or(708))),
     ("soup", |size| triangles("soup", size, |n| soup::uniform(n, 1))),
     ("clusters", |size| triangles("clusters", size, |n| soup::clusters(n, 1))),
     ("sticks", |size| triangles("sticks", size, |n| soup::sticks(n, 1e3, 1))),
@@ -346,10 +357,7 @@ mod tests {
             assert!(by_name(name, Some(u32::MAX)).is_err(), "{name}");
         }
         let error = by_name("bunny", None).unwrap_err().to_string();
-        assert!(
-            error.starts_with("there is no scene \"bunny\"; there are balls, tetra, stadium,"),
-            "{error}"
-        );
+        assert!(error.starts_with("there is no scene \"bunny\"; there are balls, gears, jacks,"), "{error}");
     }
 
     #[test]

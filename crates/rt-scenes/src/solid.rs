@@ -1,15 +1,16 @@
 //! [`Solid`]: one shape of a mixed scene.
 
+use crate::Facet;
 use core::ops::ControlFlow;
 use rt_accel::{Counts, Hit, Primitive, WorldBound};
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
-use rt_shapes::{Partials, Polygon, Shape, Sphere, Surface, Uv};
+use rt_shapes::{Frustum, Partials, Polygon, Shape, Sphere, Surface, Uv};
 
 /// One solid of a mixed scene: answers as the shape inside does, rays of both precisions.
 ///
-/// A closed set of shapes, so that a list of them is flat in memory and no call is virtual.
+/// A closed set of shapes, 64 bytes each and what they refer to, so that no call is virtual.
 ///
 /// ```
 /// use rt_accel::{Aggregate, Exhaustive, Primitive};
@@ -29,6 +30,10 @@ pub enum Solid {
     Sphere(Sphere),
     /// A planar polygon.
     Polygon(Polygon),
+    /// A triangle, perhaps with normals to shade with.
+    Facet(Facet),
+    /// A cylinder or cone without ends; elsewhere, because it is several times as large as the others.
+    Frustum(Box<Frustum>),
 }
 
 impl From<Sphere> for Solid {
@@ -43,12 +48,26 @@ impl From<Polygon> for Solid {
     }
 }
 
+impl From<Facet> for Solid {
+    fn from(facet: Facet) -> Solid {
+        Solid::Facet(facet)
+    }
+}
+
+impl From<Frustum> for Solid {
+    fn from(frustum: Frustum) -> Solid {
+        Solid::Frustum(Box::new(frustum))
+    }
+}
+
 /// The same call on whichever shape is inside.
 macro_rules! each {
     ($solid:expr, $shape:ident => $call:expr) => {
         match $solid {
             Solid::Sphere($shape) => $call,
             Solid::Polygon($shape) => $call,
+            Solid::Facet($shape) => $call,
+            Solid::Frustum($shape) => $call,
         }
     };
 }

@@ -3,29 +3,80 @@
 //! Source: M. Newell, thesis, University of Utah, 1975; control points as tabulated by F. Crow, "The origins of the teapot", *IEEE
 //! Computer Graphics and Applications* 7(1), 1987, 8-19, with his bottom.
 
+use crate::numbers::mesh;
 use rt_geom::glam::DVec3;
+use rt_shapes::TriangleMesh;
 
 /// The pot as triangles of `f64`: each patch on a grid of `n x n` squares, two triangles each, and none where a side of a patch is
 /// a point: `64 n^2 - 8 n` triangles for `n` from 1.
 ///
 /// z is up, the length along x is 6.43, the bottom is at 0. Triangles turn left seen from outside. Not closed: lid and body do not meet.
 pub(crate) fn triangles(n: u32) -> Vec<[DVec3; 3]> {
-    let mut triangles = Vec::with_capacity(64 * (n * n) as usize);
+    let (points, triangles) = grid(n, point);
+    triangles.iter().map(|corners| corners.map(|i| points[i as usize])).collect()
+}
+
+/// The same triangles with normals from the patches' derivatives, outward; up where the lid has a point, down where the bottom has.
+pub(crate) fn smooth(n: u32) -> TriangleMesh<f64> {
+    let (points, triangles) = grid(n, point);
+    let (normals, _) = grid(n, normal);
+    let at_tip = |p: &DVec3| p.x == 0.0 && p.y == 0.0;
+    let normals = points.iter().zip(&normals).map(|(p, normal)| match at_tip(p) {
+        true if p.z > 1.0 => [0.0, 0.0, 1.0],
+        true => [0.0, 0.0, -1.0],
+        false => normal.as_vec3().to_array(),
+    });
+    let normals = normals.collect();
+    let mesh = mesh(points.iter().map(|p| p.to_array()).collect(), triangles);
+    mesh.with_normals(normals).expect("one for each point")
+}
+
+/// `value` at the grid points of all patches, and the triangles between those points, by number.
+fn grid(n: u32, value: impl Fn(&[DVec3; 16], f64, f64) -> DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let mut values = Vec::with_capacity(32 * (n as usize + 1).pow(2));
+    let mut triangles = Vec::with_capacity(64 * (n as usize).pow(2));
+    let at = |i: u32| f64::from(i) / f64::from(n);
     for patch in PATCHES {
         let net = patch.map(|i| DVec3::from_array(VERTICES[usize::from(i) - 1]));
-        let at = |i: u32, j: u32| point(&net, f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+        // Rows that are one point: their triangles have two corners there, and are none.
+        let tip = |i: u32| {
+            let row = &net[12 * i as usize..][..4];
+            row.iter().all(|p| *p == row[0])
+        };
+        let first = values.len() as u32;
+        values.extend(
+            (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))).map(|(i, j)| value(&net, at(i), at(j))),
+        );
         for i in 0..n {
             for j in 0..n {
-                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-                for [p, q, r] in [[a, c, b], [a, d, c]] {
-                    if p != q && q != r && r != p {
-                        triangles.push([p, q, r]);
-                    }
+                let [a, b, c, d] =
+                    [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| first + i * (n + 1) + j);
+                if !(i + 1 == n && tip(1)) {
+                    triangles.push([a, c, b]);
+                }
+                if !(i == 0 && tip(0)) {
+                    triangles.push([a, d, c]);
                 }
             }
         }
     }
-    triangles
+    (values, triangles)
+}
+
+/// The unit normal at `u`, `v`, out of the pot; zero where a row is one point.
+fn normal(net: &[DVec3; 16], u: f64, v: f64) -> DVec3 {
+    let sum = |bu: [f64; 4], bv: [f64; 4]| {
+        (0..16).fold(DVec3::ZERO, |sum, i| sum + net[i] * (bu[i / 4] * bv[i % 4]))
+    };
+    let (along_u, along_v) = (sum(slopes(u), bernstein(v)), sum(bernstein(u), slopes(v)));
+    // The parameters turn right, seen from outside.
+    along_v.cross(along_u).normalize_or_zero()
+}
+
+/// Derivatives of [`bernstein`].
+fn slopes(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [-3.0 * s * s, 3.0 * s * (s - 2.0 * t), 3.0 * t * (2.0 * s - t), 3.0 * t * t]
 }
 
 /// The point of a patch at `u`, `v` in `[0, 1]`.

@@ -133,6 +133,11 @@ impl<V: Real> TriangleMesh<V> {
         &self.triangles
     }
 
+    /// The normals to shade with, one per vertex; empty where there are none.
+    pub fn normals(&self) -> &[[f32; 3]] {
+        &self.normals
+    }
+
     /// Triangle `prim` by its corners.
     ///
     /// # Panics

@@ -28,7 +28,8 @@ use rt_geom::{Axis, Ray, Real, Transform};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygon {
-    triangles: Vec<Triangle>,
+    corners: Box<[DVec3]>,
+    triangles: Box<[Triangle]>,
     normal: DVec3,
 }
 
@@ -65,7 +66,12 @@ impl Polygon {
     pub fn new(corners: &[DVec3]) -> Result<Polygon, PolygonError> {
         let (cuts, normal) = cut(corners)?;
         let triangles = cuts.into_iter().map(|cut| Triangle { corners: cut.map(|i| corners[i]) }).collect();
-        Ok(Polygon { triangles, normal })
+        Ok(Polygon { corners: corners.into(), triangles, normal })
+    }
+
+    /// The corners, in the order given.
+    pub fn corners(&self) -> &[DVec3] {
+        &self.corners
     }
 
     /// The triangles `corners` is cut into, by corner numbers, turning the way the corners do: for meshes of polygons.
@@ -232,6 +238,29 @@ mod tests {
         assert!(inside > 1000);
         // Each corner belongs to the polygon.
         assert!(corners.iter().all(|&c| polygon.intersect_p(&Ray::new(c - DVec3::Z, DVec3::Z))));
+    }
+
+    /// There the error of a point along the normal is zero, and the next number after zero is lost in products.
+    #[test]
+    fn rays_that_leave_a_plane_through_zero_do_not_meet_it() {
+        let square = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.6), (0.0, 0.6)];
+        for tiny in [1.0, 1e-3, 1e-12] {
+            let polygon = Polygon::new(&square.map(|(x, y)| DVec3::new(x, y, 0.0) * tiny)).unwrap();
+            for (x, y) in [(0.1, 0.2), (0.3, 0.3), (0.55, 0.01)] {
+                for z in [1.0, -1.0] {
+                    let ray = Ray::new(DVec3::new(x, y, z) * tiny, DVec3::new(0.01, 0.02, -z));
+                    let hit = polygon.intersect(&ray).unwrap();
+                    let surface = Shape::<f64>::surface(&polygon, &ray, &hit);
+                    for dir in [DVec3::new(0.3, 0.1, 1.0), DVec3::new(0.2, 0.9, -0.1)] {
+                        assert!(!polygon.intersect_p(&surface.spawn(dir)), "{tiny} {x} {y} {z} {dir}");
+                        assert!(
+                            !polygon.intersect_p(&surface.spawn(dir.as_vec3a())),
+                            "{tiny} {x} {y} {z} {dir}"
+                        );
+                    }
+                }
+            }
+        }
     }
 
     #[test]

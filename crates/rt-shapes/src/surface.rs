@@ -31,6 +31,9 @@ pub struct Surface {
     pub uv: DVec2,
 }
 
+/// `2^-60`.
+const STEP: f64 = f64::EPSILON / 256.0;
+
 impl Surface {
     /// A ray leaving the surface towards `dir`, for `t` in `[0, inf]`: its origin lies off the surface, on the side `dir`
     /// points to, by no more than the point's error and one unit in the last place. It does not meet this surface at its
@@ -39,8 +42,10 @@ impl Surface {
     /// Source: Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed. (2023), section 6.8.6.
     pub fn spawn<V: Vector>(&self, dir: V) -> Ray<V::Real> {
         let side = if dir.widen().dot(self.normal) < 0.0 { -self.normal } else { self.normal };
-        // The distance to clear the error box along the normal.
-        let off = side * self.error.dot(side.abs());
+        // The distance to clear the error box along the normal. In a plane through zero the error along the normal is zero too, and
+        // the next number after zero is so small that products with it vanish: a share of the other errors, far below their
+        // own rounding, keeps the step in range.
+        let off = side * (self.error.dot(side.abs()) + self.error.max_element() * STEP);
         let mut origin = self.point + off;
         for a in 0..3 {
             // Away from the surface by rounding: to the precision of the ray, and by one more unit of f64 for the sum above.
