@@ -82,8 +82,8 @@ pub struct Measured {
     pub error: HitError,
     /// Whether distances were asked for.
     pub has_t: bool,
-    /// Of a bounding volume: the share of the lines that meet it which miss the thing inside.
-    pub void: Option<f64>,
+    /// An error that is not about hits: the void in a bounding volume, the distance of triangles from a smooth surface.
+    pub off: Option<(ErrorKind, f64)>,
     /// What only this question tells, by name; in records behind the parameters.
     pub figures: Vec<(&'static str, f64)>,
     /// Whether nobody in the group beats it in both of what the question weighs: error and time, or build time and time.
@@ -121,12 +121,14 @@ impl Group {
                 error_kind,
                 error,
             };
-            rows.push(row(ErrorKind::Wrong, tidy(m.error.wrong_per_million())));
+            if m.error.rays > 0 {
+                rows.push(row(ErrorKind::Wrong, tidy(m.error.wrong_per_million())));
+            }
             if m.has_t {
                 rows.push(row(ErrorKind::TUlp, tidy(m.error.t_ulp)));
             }
-            if let Some(void) = m.void {
-                rows.push(row(ErrorKind::Void, tidy(void)));
+            if let Some((kind, off)) = m.off {
+                rows.push(row(kind, tidy(off)));
             }
             if !m.error.is_exact() {
                 rows.push(row(ErrorKind::Missed, tidy(m.error.missed_per_million())));
@@ -166,8 +168,8 @@ pub(crate) enum Weigh {
     Error,
     /// What is missed: what is made up costs time alone, and is in it.
     Misses,
-    /// What lies between a volume and the thing inside.
-    Void,
+    /// An error that is not about hits.
+    Off,
     BuildTime,
 }
 
@@ -220,7 +222,7 @@ pub(crate) fn mark_front(measured: &mut [Measured], weigh: Weigh) {
     let against = |m: &Measured| match weigh {
         Weigh::Error => m.error.wrong_per_million(),
         Weigh::Misses => m.error.missed_per_million(),
-        Weigh::Void => m.void.unwrap_or(f64::NAN),
+        Weigh::Off => m.off.map_or(f64::NAN, |(_, off)| off),
         Weigh::BuildTime => m.build_ms.unwrap_or(f64::NAN),
     };
     let points: Vec<Point> =

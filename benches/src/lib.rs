@@ -8,6 +8,8 @@
 //! | [`Question::Precision`] | what does the fast triangle test gain, and what does it get wrong? |
 //! | [`Question::Slab`] | which box test? |
 //! | [`Question::Volumes`] | which bounding volume, and when does it pay? |
+//! | [`Question::Shapes`] | what do smooth shapes cost, met directly and as triangles, and how far off are those? |
+//! | [`Question::Lazy`] | what does it save to refine only what rays come near? |
 //! | [`Question::Rivals`] | how do other people's structures fare on the same rays? (feature `rivals`) |
 //!
 //! # How a figure comes about
@@ -55,22 +57,16 @@
 
 mod contest;
 mod fast;
-#[allow(dead_code)] // Not asked yet.
 mod fractals;
 mod judge;
 mod knobs;
-#[allow(dead_code)] // Not asked yet.
 mod lazy;
-#[allow(dead_code)] // Not asked yet.
 mod patches;
 mod queries;
 #[cfg(feature = "rivals")]
 mod rivals;
-// Its question is not asked yet.
-#[cfg_attr(not(test), expect(dead_code))]
 mod shapes;
 mod slab;
-// Part of the question `volumes`.
 mod space;
 mod subject;
 mod volumes;
@@ -103,19 +99,25 @@ pub enum Question {
     Slab,
     /// Which bounding volume, and when does it pay?
     Volumes,
+    /// What do smooth shapes cost, met directly and as triangles?
+    Shapes,
+    /// What does it save to refine only what rays come near?
+    Lazy,
     /// How do others fare? Only with the feature `rivals`.
     Rivals,
 }
 
 impl Question {
     /// All questions.
-    pub const ALL: [Question; 7] = [
+    pub const ALL: [Question; 9] = [
         Question::Closest,
         Question::Any,
         Question::Build,
         Question::Precision,
         Question::Slab,
         Question::Volumes,
+        Question::Shapes,
+        Question::Lazy,
         Question::Rivals,
     ];
 
@@ -128,6 +130,8 @@ impl Question {
             Question::Precision => "precision",
             Question::Slab => "slab",
             Question::Volumes => "volumes",
+            Question::Shapes => "shapes",
+            Question::Lazy => "lazy",
             Question::Rivals => "rivals",
         }
     }
@@ -141,18 +145,24 @@ impl Question {
             (Question::Precision, Effort::Quick) => 12,
             (Question::Slab, _) => 2,
             (Question::Volumes, Effort::Quick) => 30,
+            (Question::Shapes, Effort::Quick) => 15,
+            (Question::Lazy, Effort::Quick) => 30,
             (Question::Rivals, Effort::Quick) => 25,
             (Question::Closest, Effort::Normal) => 90,
             (Question::Any, Effort::Normal) => 60,
             (Question::Build, Effort::Normal) => 170,
             (Question::Precision, Effort::Normal) => 40,
             (Question::Volumes, Effort::Normal) => 150,
+            (Question::Shapes, Effort::Normal) => 60,
+            (Question::Lazy, Effort::Normal) => 60,
             (Question::Rivals, Effort::Normal) => 200,
             (Question::Closest, Effort::Full) => 360,
             (Question::Any, Effort::Full) => 240,
             (Question::Build, Effort::Full) => 600,
             (Question::Precision, Effort::Full) => 90,
             (Question::Volumes, Effort::Full) => 600,
+            (Question::Shapes, Effort::Full) => 180,
+            (Question::Lazy, Effort::Full) => 120,
             (Question::Rivals, Effort::Full) => 480,
         };
         Duration::from_secs(seconds)
@@ -279,11 +289,23 @@ pub fn ask(question: Question, options: &Options, watch: Watch<'_>) -> Result<Ve
         Question::Build => knobs::ask(options, watch),
         Question::Slab => slab::ask(options.effort, watch),
         Question::Volumes => volumes::ask(options.effort, watch),
+        Question::Shapes => {
+            let mut groups = shapes::ask(options.effort, &mut part(watch, 0, 3))?;
+            groups.extend(patches::ask(options.effort, &mut part(watch, 1, 3))?);
+            groups.extend(fractals::ask(options.effort, &mut part(watch, 2, 3))?);
+            Ok(groups)
+        }
+        Question::Lazy => lazy::ask(options.effort, watch),
         #[cfg(feature = "rivals")]
         Question::Rivals => rivals::ask(options, watch),
         #[cfg(not(feature = "rivals"))]
         Question::Rivals => Err(Trouble::NoRivals),
     }
+}
+
+/// Watches one of several parts of a question.
+fn part(watch: Watch<'_>, which: usize, of: usize) -> impl FnMut(f32) -> ControlFlow<()> {
+    move |done| watch((which as f32 + done) / of as f32)
 }
 
 /// `Err` once the watcher has said stop.

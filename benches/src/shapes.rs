@@ -1,43 +1,31 @@
 //! What do smooth shapes cost as triangles, and how far are the triangles from them?
 
+use crate::contest::{Group, Measured};
 use crate::{Effort, Trouble, Watch, hear};
 use core::hint::black_box;
 use rt_measure::clock::race;
 use rt_measure::front::{Point, front};
-use rt_shapes::{Deviation, LoopError, LoopSurface, Vertices};
-
-/// One way to make triangles of a Loop surface.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Tessellation {
-    pub(crate) shape: &'static str,
-    pub(crate) level: u32,
-    pub(crate) vertices: Vertices,
-    /// How many triangles, and how far from the surface they are, in units of the control net.
-    pub(crate) deviation: Deviation,
-    /// Nanoseconds a triangle, the median.
-    pub(crate) ns_per_triangle: f64,
-    /// The 90th percentile of rounds over the 10th.
-    pub(crate) spread: f64,
-    /// Whether nothing of the same shape beats it in both time and largest distance. Limit vertices come
-    /// with normals, control vertices without.
-    pub(crate) on_front: bool,
-}
+use rt_measure::record::ErrorKind;
+use rt_shapes::{LoopError, LoopSurface, Vertices};
 
 /// Both ways to place vertices, level by level, on surfaces with and without boundary.
-pub(crate) fn ask_loop(effort: Effort, watch: Watch<'_>) -> Result<Vec<Tessellation>, Trouble> {
+///
+/// `ns` is a triangle's share of making the mesh; limit vertices come with normals, control vertices without. The front weighs the
+/// time of the whole mesh against the largest distance.
+pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Trouble> {
     let levels = match effort {
         Effort::Quick => 4,
         Effort::Normal => 5,
         Effort::Full => 7,
     };
     let refused = |error: LoopError| Trouble::Scene(error.to_string());
-    let shapes = [("octahedron", octahedron()), ("ground", ground())];
-    let mut all = Vec::new();
-    for (name, shape) in shapes {
+    let mut groups = Vec::new();
+    for (k, (name, shape)) in [("octahedron", octahedron()), ("ground", ground())].into_iter().enumerate() {
         let surface = shape.map_err(refused)?;
-        let begin = all.len();
+        let size = f64::from(surface.world_bound().size().length());
+        let (mut measured, mut points) = (Vec::new(), Vec::new());
         for level in 0..levels {
-            hear(watch, all.len(), 4 * levels as usize)?;
+            hear(watch, k * levels as usize + level as usize, 2 * levels as usize)?;
             // What level 0 refuses, the timed loop below need not look at.
             let mut limit = || {
                 black_box(surface.refine::<f32>(level).is_ok());
@@ -48,27 +36,35 @@ pub(crate) fn ask_loop(effort: Effort, watch: Watch<'_>) -> Result<Vec<Tessellat
             let race = race(effort.plan(), &mut [&mut limit, &mut control]);
             for (who, vertices) in [Vertices::Limit, Vertices::Control].into_iter().enumerate() {
                 let deviation = surface.deviation(level, vertices, 3).map_err(refused)?;
-                all.push(Tessellation {
-                    shape: name,
-                    level,
-                    vertices,
-                    deviation,
-                    ns_per_triangle: race.median(who) / deviation.triangles.max(1) as f64,
+                let triangles = deviation.triangles as f64;
+                points.push(Point { time: race.median(who), error: deviation.largest });
+                measured.push(Measured {
+                    structure: ["limit", "control"][who].into(),
+                    params: format!("level={level}"),
+                    build_ms: Some(race.median(who) / 1e6),
+                    ns_per_ray: race.median(who) / triangles.max(1.0),
                     spread: race.spread(who),
-                    on_front: false,
+                    speed: race.ratio(0, who),
+                    off: Some((ErrorKind::Distance, deviation.largest / size)),
+                    figures: vec![("triangles", triangles), ("rms", deviation.rms / size)],
+                    ..Measured::default()
                 });
             }
         }
-        let mine = &mut all[begin..];
-        let total = |t: &Tessellation| t.ns_per_triangle * t.deviation.triangles as f64;
-        let points: Vec<Point> =
-            mine.iter().map(|t| Point { time: total(t), error: t.deviation.largest }).collect();
         for i in front(&points) {
-            mine[i].on_front = true;
+            measured[i].on_front = true;
         }
+        groups.push(Group {
+            scene: format!("loop {name}"),
+            prims: surface.face_count(),
+            ray_kind: "no rays".into(),
+            rays: 0,
+            judged: 0,
+            outcome: Ok(measured),
+        });
     }
     hear(watch, 1, 1)?;
-    Ok(all)
+    Ok(groups)
 }
 
 /// Six vertices with four neighbours: the smallest smooth ball.
@@ -100,20 +96,16 @@ mod tests {
 
     #[test]
     fn finer_is_nearer() {
-        let all = ask_loop(Effort::Quick, &mut |_| ControlFlow::Continue(())).unwrap();
-        assert_eq!(all.len(), 16);
-        for shape in all.chunk_by(|a, b| a.shape == b.shape) {
-            assert!(shape.iter().any(|t| t.on_front && t.level == 3));
-            for (coarse, fine) in shape.iter().zip(&shape[2..]) {
-                assert!(fine.deviation.largest < coarse.deviation.largest, "{coarse:?} {fine:?}");
-                assert!(
-                    fine.deviation.rms < coarse.deviation.rms
-                        && fine.ns_per_triangle > 0.0
-                        && fine.spread >= 1.0
-                );
+        let groups = ask(Effort::Quick, &mut |_| ControlFlow::Continue(())).unwrap();
+        assert_eq!(groups.len(), 2);
+        for group in groups {
+            let all = group.outcome.unwrap();
+            let off = |m: &Measured| m.off.unwrap().1;
+            assert!(all.len() == 8 && all.iter().any(|m| m.on_front && m.params == "level=3"));
+            for (coarse, fine) in all.iter().zip(&all[2..]) {
+                assert!(off(fine) < off(coarse) && fine.ns_per_ray > 0.0, "{coarse:?} {fine:?}");
             }
         }
-        assert_eq!(all[0].vertices, Vertices::Limit);
-        assert!(ask_loop(Effort::Quick, &mut |_| ControlFlow::Break(())).is_err());
+        assert!(ask(Effort::Quick, &mut |_| ControlFlow::Break(())).is_err());
     }
 }

@@ -5,7 +5,7 @@
 //! predicted, and the prediction is compared with the time that bound and object take together.
 
 use crate::contest::{Group, Measured, Mismatch, Weigh, mark_front};
-use crate::{Effort, Trouble, Watch, hear, space};
+use crate::{Effort, Trouble, Watch, hear, part, space};
 use core::hint::black_box;
 use rt_bounds::{Aabb, BoundingSphere, BoundingVolume, Extremes, Hull, Kdop, Obb};
 use rt_geom::Ray;
@@ -14,6 +14,7 @@ use rt_measure::clock::{Plan, Race, quantile, race};
 use rt_measure::error::HitError;
 use rt_measure::exact;
 use rt_measure::rays::Seeded;
+use rt_measure::record::ErrorKind;
 use rt_shapes::Triangle;
 use std::time::Instant;
 
@@ -303,7 +304,7 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
         let Plan { warm_up, rounds } = effort.plan();
         groups.extend(weigh(kind, &stage, Plan { warm_up, rounds: 2 * rounds + 1 }));
     }
-    groups.extend(space::ask(effort, watch)?);
+    groups.extend(space::ask(effort, &mut part(watch, kinds.len(), kinds.len() + 1))?);
     Ok(groups)
 }
 
@@ -346,12 +347,12 @@ fn weigh(kind: &Kind, stage: &Stage, plan: Plan) -> [Group; 2] {
             build_ms: Some(e.build_ms),
             bytes_per_prim: Some(e.bytes),
             speed: race.ratio(1, who),
-            void: Some(f.void),
+            off: Some((ErrorKind::Void, f.void)),
             figures: vec![("hit_ns", f.hit), ("miss_ns", f.miss), ("ready_ns", f.ready), ("area", e.area)],
             ..plain(e.name, e.params, who, pairs)
         });
     }
-    mark_front(&mut fit, Weigh::Void);
+    mark_front(&mut fit, Weigh::Off);
     let mut cost = vec![Measured { figures: vec![("p", 1.0)], ..plain("none", "", 0, pairs) }];
     for (i, (e, f)) in entrants.iter().zip(&figures).enumerate() {
         let who = 1 + 6 * i + 4;

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::output::{Json, Progress, catch_interrupts, root, say, thousands, write_whole};
 use clap::ValueEnum;
 use rt_bench::{Effort, Group, Measured, Options, Question, Stamp, Subject, Trouble, ask};
-use rt_measure::record::{HEADER, Row, parse};
+use rt_measure::record::{ErrorKind, HEADER, Row, parse};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -74,6 +74,10 @@ enum Asked {
     Slab,
     /// Which bounding volume, and when does it pay?
     Volumes,
+    /// What do smooth shapes cost, met directly and as triangles?
+    Shapes,
+    /// What does it save to refine only what rays come near?
+    Lazy,
     /// How do other people's structures fare?
     Rivals,
 }
@@ -87,6 +91,8 @@ impl Asked {
             Asked::Precision => Question::Precision,
             Asked::Slab => Question::Slab,
             Asked::Volumes => Question::Volumes,
+            Asked::Shapes => Question::Shapes,
+            Asked::Lazy => Question::Lazy,
             Asked::Rivals => Question::Rivals,
         }
     }
@@ -355,11 +361,13 @@ fn table(measured: &[Measured]) -> String {
         "invented/M",
         "t ulp",
         "void",
+        "distance",
     ];
     header.extend(&names);
     let mut lines: Vec<Vec<String>> = vec![header.into_iter().map(String::from).collect()];
     for m in measured {
         let error = &m.error;
+        let rate = |x: f64| if error.rays > 0 { format!("{x:.0}") } else { String::new() };
         let mut line = vec![
             if m.on_front { "*" } else { "" }.to_string(),
             m.structure.clone(),
@@ -371,11 +379,14 @@ fn table(measured: &[Measured]) -> String {
             format!("{:.2}", m.speed),
             optional(m.nodes_per_ray, 1),
             optional(m.tests_per_ray, 1),
-            format!("{:.0}", error.wrong_per_million()),
-            format!("{:.0}", error.missed_per_million()),
-            format!("{:.0}", error.invented_per_million()),
+            rate(error.wrong_per_million()),
+            rate(error.missed_per_million()),
+            rate(error.invented_per_million()),
             optional(m.has_t.then_some(error.t_ulp), 2),
-            optional(m.void, 3),
+            optional(m.off.filter(|(kind, _)| *kind == ErrorKind::Void).map(|(_, off)| off), 3),
+            m.off
+                .filter(|(kind, _)| *kind == ErrorKind::Distance)
+                .map_or_else(String::new, |(_, off)| format!("{off:.2e}")),
         ];
         for name in &names {
             let told = m.figures.iter().find(|(own, _)| own == name);
@@ -479,7 +490,8 @@ fn json(stamp: &Stamp, threads: u16, answers: &[(Question, Vec<Group>)]) -> Json
             ("missed_per_million", Json::Number(m.error.missed_per_million())),
             ("invented_per_million", Json::Number(m.error.invented_per_million())),
             ("t_ulp", optional(m.has_t.then_some(m.error.t_ulp))),
-            ("void", optional(m.void)),
+            ("off", optional(m.off.map(|(_, off)| off))),
+            ("off_kind", Json::Text(m.off.map_or_else(String::new, |(kind, _)| kind.name().to_string()))),
             ("figures", Json::Object(m.figures.iter().map(|(name, x)| (*name, Json::Number(*x))).collect())),
             ("on_front", Json::Whole(m.on_front.into())),
         ])

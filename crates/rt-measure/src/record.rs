@@ -19,18 +19,21 @@ pub enum ErrorKind {
     TUlp,
     /// What a bounding volume encloses in vain: the share of the lines that meet it which miss the thing inside.
     Void,
+    /// The largest distance of an approximate surface from the exact one, as a share of its size.
+    Distance,
     /// The root mean squared difference of images.
     Rmse,
 }
 
 impl ErrorKind {
     /// All kinds.
-    pub const ALL: [ErrorKind; 6] = [
+    pub const ALL: [ErrorKind; 7] = [
         ErrorKind::Missed,
         ErrorKind::Invented,
         ErrorKind::Wrong,
         ErrorKind::TUlp,
         ErrorKind::Void,
+        ErrorKind::Distance,
         ErrorKind::Rmse,
     ];
 
@@ -42,6 +45,7 @@ impl ErrorKind {
             ErrorKind::Wrong => "wrong",
             ErrorKind::TUlp => "t_ulp",
             ErrorKind::Void => "void",
+            ErrorKind::Distance => "distance",
             ErrorKind::Rmse => "rmse",
         }
     }
