@@ -3,6 +3,12 @@
 //! Weghorst, Hooper and Greenberg (ACM TOG 3(1), 1984): `N` rays that reach an object cost `N c_o`; with a bound they cost
 //! `N c_b + p N c_o`, where `p` is the share of the rays that meet the bound. Here every term is measured by itself, the sum is
 //! predicted, and the prediction is compared with the time that bound and object take together.
+//!
+//! `p` is counted, `p_area` the ratio of surfaces that it should be; `c_b` is the bound's test over all rays, of which `hit_ns` and
+//! `miss_ns` tell those that meet it and those that do not, each kind by itself and so without a mispredicted branch; `c_o` is the
+//! object's over the rays that meet the bound. `off_%` compares within rounds, both sides measured in the same one, and is the median
+//! of those; `predicted` is of the medians. What is done once a ray for all volumes, `ready_ns`, is in neither. `pays_from` is the
+//! number of triangles from which on an object is worth its bound by the model, `seen_from` by the clock; 0 is always.
 
 use crate::contest::{Group, Measured, Mismatch, Weigh, mark_front};
 use crate::{Effort, Trouble, Watch, hear, part, space};
@@ -359,16 +365,22 @@ fn weigh(kind: &Kind, stage: &Stage, plan: Plan) -> [Group; 2] {
         cost.push(Measured {
             speed: race.ratio(0, who),
             tests_per_ray: Some(f.p),
-            figures: vec![
+            figures: [
                 ("p", f.p),
                 ("p_area", f.p_area),
                 ("c_b", f.bound),
                 ("c_o", f.object),
                 ("predicted", f.predicted),
                 ("off_%", f.off * 100.0),
-                ("pays_from", pays[i][0]),
-                ("seen_from", pays[i][1]),
-            ],
+            ]
+            .into_iter()
+            .chain(
+                ["pays_from", "seen_from"]
+                    .into_iter()
+                    .zip(pays[i].map(|from| if from < 0.0 { 0.0 } else { from })),
+            )
+            .filter(|(_, figure)| figure.is_finite())
+            .collect(),
             ..plain(e.name, e.params, who, pairs)
         });
     }
@@ -406,7 +418,7 @@ fn times(stage: &Stage, plan: Plan, entrants: &mut [Entrant<'_>]) -> Race {
 /// For each entrant: from how many triangles on objects are quicker with the bound than without, as the model says and as seen.
 ///
 /// A bound costs `N c_b` and saves the object's time on the rays that miss the bound, `(1 - p) N c_o`, which grows linearly with
-/// the triangles: all are timed for some numbers of triangles and fitted by a line. Below 1: it always pays.
+/// the triangles: all are timed for some numbers of triangles and fitted by a line. NaN for objects of fewer than two triangles.
 fn pays_from(stage: &Stage, plan: Plan, entrants: &mut [Entrant<'_>]) -> Vec<[f64; 2]> {
     let most = stage.objects.first().map_or(0, |object| object.triangles.len());
     let kept: Vec<usize> = KEPT.into_iter().filter(|kept| *kept <= most).collect();

@@ -323,7 +323,10 @@ fn text(question: Question, groups: &[Group]) -> String {
             thousands(group.judged as u64)
         );
         match &group.outcome {
-            Ok(measured) => out += &table(measured),
+            Ok(measured) => {
+                out += &table(measured);
+                out += &predictions(measured);
+            }
             Err(mismatch) => {
                 let _ = writeln!(out, "  NOT TIMED: {mismatch}");
             }
@@ -334,6 +337,22 @@ fn text(question: Question, groups: &[Group]) -> String {
     }
     out.push('\n');
     out
+}
+
+/// How the predictions of a group did, where there were any.
+fn predictions(measured: &[Measured]) -> String {
+    let off: Vec<f64> = measured
+        .iter()
+        .flat_map(|m| &m.figures)
+        .filter(|(name, _)| *name == "off_%")
+        .map(|(_, off)| off.abs())
+        .collect();
+    if off.is_empty() {
+        return String::new();
+    }
+    let near = off.iter().filter(|off| **off <= 10.0).count();
+    let median = rt_measure::clock::quantile(&off, 0.5);
+    format!(" {near} of {} predictions within 10 %; half within {median:.1} %\n", off.len())
 }
 
 /// A table of all that anybody in the group tells.
@@ -431,23 +450,44 @@ fn aligned(lines: &[Vec<String>]) -> String {
 /// For contestants in several groups: the geometric mean of the speed against the first, and of build times against its.
 fn means(groups: &[Group]) -> Option<String> {
     let timed: Vec<&Vec<Measured>> = groups.iter().filter_map(|group| group.outcome.as_ref().ok()).collect();
-    if timed.len() < 2 {
-        return None;
+    let who = |m: &Measured| (m.structure.clone(), m.params.clone());
+    // Groups that begin with the same contestant are measured by the same rod.
+    let mut rods: Vec<(String, String)> = Vec::new();
+    for first in timed.iter().filter_map(|group| group.first()) {
+        if !rods.contains(&who(first)) {
+            rods.push(who(first));
+        }
     }
+    let tables: String = rods
+        .iter()
+        .filter_map(|rod| {
+            let same: Vec<&Vec<Measured>> = timed
+                .iter()
+                .copied()
+                .filter(|group| group.first().is_some_and(|first| who(first) == *rod))
+                .collect();
+            means_against(rod, &same)
+        })
+        .collect();
+    (!tables.is_empty()).then_some(tables)
+}
+
+/// Means over groups that begin with the same contestant.
+fn means_against(rod: &(String, String), timed: &[&Vec<Measured>]) -> Option<String> {
     let mut names: Vec<(&str, &str)> = Vec::new();
     for m in timed.iter().copied().flatten() {
         if !names.contains(&(&m.structure, &m.params)) {
             names.push((&m.structure, &m.params));
         }
     }
-    if names.len() < 2 {
+    if timed.len() < 2 || names.len() < 2 {
         return None;
     }
     let mut lines =
         vec![["", "structure", "params", "groups", "speed", "build time"].map(String::from).to_vec()];
     for (structure, params) in names {
         let (mut speeds, mut builds) = (Vec::new(), Vec::new());
-        for group in &timed {
+        for group in timed {
             let Some(m) = group.iter().find(|m| m.structure == structure && m.params == params) else {
                 continue;
             };
@@ -465,7 +505,8 @@ fn means(groups: &[Group]) -> Option<String> {
             if builds.is_empty() { "-".into() } else { format!("{:.2}", geometric_mean(&builds)) },
         ]);
     }
-    Some(format!("\ngeometric means against the first contestant\n{}", aligned(&lines)))
+    let rod = format!("{} {}", rod.0, rod.1);
+    Some(format!("\ngeometric means against {}\n{}", rod.trim_end(), aligned(&lines)))
 }
 
 fn geometric_mean(numbers: &[f64]) -> f64 {

@@ -264,6 +264,27 @@ fn no_wrong_miss_in_f64() {
     none_wrong(adversarial::<f64>(2, 300_000), 500_000);
 }
 
+/// Ten million pairs that meet, of each test of one box and of eight. Some minutes: run with `--release -- --ignored`.
+#[test]
+#[ignore = "takes minutes"]
+fn no_wrong_miss_in_ten_million() {
+    let mut hits = 0;
+    for seed in 10.. {
+        for (wrong, met) in [
+            adversarial::<f32>(seed, 300_000),
+            adversarial::<f64>(!seed, 300_000),
+            far_away::<f32>(seed, 50_000),
+            far_away::<f64>(!seed, 50_000),
+        ] {
+            hits += met;
+            none_wrong((wrong, met), 1);
+        }
+        if hits >= 10_000_000 {
+            break;
+        }
+    }
+}
+
 #[test]
 fn no_wrong_miss_far_away_in_f32() {
     none_wrong(far_away::<f32>(3, 50_000), 50_000);
