@@ -194,6 +194,23 @@ fn quick_spheres_are_near_the_smallest() {
     }
 }
 
+/// Points on which Ritter's growth does badly, found by hill climbing: what random sets never show.
+#[test]
+fn the_worst_known_set_for_ritter() {
+    let points = [
+        [0.23946824188695012, -0.44338228738095165, 0.17763046534880617],
+        [0.14285633782779666, -0.3542312289626291, 0.4638843566355397],
+        [-0.679554599640319, -0.456285754101016, 0.47221260933968334],
+        [0.30863717370180277, -0.2836728863414794, -0.24172545577766394],
+        [-0.6797151902730666, -0.35264673536890184, -0.5292037933595496],
+        [-0.05131408627805168, 0.5259016439555528, -0.46557456948399534],
+        [-0.5926540056829505, 0.5728361419183196, -0.4158007371176765],
+        [-0.6458369463586499, 0.5728401703590474, 0.4089366194704647],
+    ];
+    let [ritter, _, _, epos_26] = ratios(&points.map(DVec3::from_array));
+    assert!((1.36..1.37).contains(&ritter) && epos_26 < 1.1, "{ritter} {epos_26}");
+}
+
 /// The vertices of the meshes in a folder named by `RT_MESHES`; none where it is not set.
 fn meshes() -> Vec<(String, Vec<DVec3>)> {
     let Some(folder) = std::env::var_os("RT_MESHES") else { return Vec::new() };
