@@ -170,12 +170,13 @@ impl Part {
 
     /// Whether `f64` times two cannot be blamed for taking this for a root: within its error there is one of the whole
     /// surface, or the line comes so close that the residual is below `1e-27`, nearly `2^-90`, but for `t` being rounded; and
-    /// each limit holds somewhere within twice the error, that of the sweep up to half a unit in the last place.
+    /// each limit holds somewhere within twice the error, that of the sweep up to `1e-15`: along a ruling at its end
+    /// the solver allows for the square of the error.
     fn near(&self, o: DVec3, d: DVec3, root: Root) -> bool {
         let error = whole(root.error * 2.0);
         let spots = [&whole(root.t) - &error, whole(root.t), &whole(root.t) + &error];
         let kept = spots.iter().fold([false; 3], |kept, t| {
-            let now = self.limits(o, d, t, 1e-16);
+            let now = self.limits(o, d, t, 1e-15);
             [0, 1, 2].map(|i| kept[i] || now[i])
         });
         let (weight, q) = self.profile();
