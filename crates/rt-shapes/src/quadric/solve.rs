@@ -318,20 +318,22 @@ fn verdict<F: Form, T: Number>(form: &F, o: DVec3, d: DVec3, t: f64, error: f64)
         return Verdict::Outside;
     }
     if let Some(sweep) = form.sweep() {
-        // The point beside the direction that angles count from, how it moves, and what it is off by.
+        // The point beside the direction that angles count from, how it moves, and what its sides are off by: on a twisted surface
+        // they bend along the line.
         let (p, moves, off) = if form.twisted() {
             let (a, b) = (form.at(w).squares, v.squares);
             let relative = |g: &[T; 4], p: &[T; 4]| [g[2] * p[0] + g[3] * p[1], g[2] * p[1] - g[3] * p[0]];
             let ([x0, y0], [x1, y1]) = (relative(&a, &b), relative(&b, &a));
             let bent = relative(&b, &b).map(|x| x.value().abs() * error * error);
             let total: f64 = a.iter().map(|x| x.value().abs()).sum();
-            (relative(&a, &a), [x0 + x1, y0 + y1], 2.0 * (eta * (total + 2.0 * eta) + bent[0] + bent[1]))
+            let off = 4.0 * eta * (total + 2.0 * eta) + bent[0] + bent[1];
+            (relative(&a, &a), [x0 + x1, y0 + y1], off)
         } else {
-            ([u.squares[0], u.squares[1]], [v.squares[0], v.squares[1]], 2.0 * eta)
+            ([u.squares[0], u.squares[1]], [v.squares[0], v.squares[1]], 4.0 * eta)
         };
         let cross = |e: DVec2, p: [T; 2]| (T::from(e.x) * p[1] - T::from(e.y) * p[0]).value();
         let side = |window: &mut Window, e: DVec2, sign: f64| {
-            window.admits(sign * cross(e, p), 2.0 * off, sign * cross(e, moves))
+            window.admits(sign * cross(e, p), off, sign * cross(e, moves))
         };
         let [from, to] = sweep.ends;
         if sweep.reflex {
