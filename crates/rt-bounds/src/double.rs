@@ -120,8 +120,8 @@ impl DAabb {
             let holds = self.min.cmple(self.max)
                 & self.min.cmplt(DVec3::INFINITY)
                 & self.max.cmpgt(DVec3::NEG_INFINITY);
-            // The difference is zero for finite numbers alone.
-            let finite = (o - o).cmpeq(DVec3::ZERO) & (d - d).cmpeq(DVec3::ZERO);
+            let most = DVec3::MAX;
+            let finite = o.abs().cmple(most) & d.abs().cmple(most);
             (holds & finite).all() && d != DVec3::ZERO && ray.t_min <= ray.t_max
         };
         if !moderate {
