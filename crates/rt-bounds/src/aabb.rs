@@ -85,6 +85,9 @@ impl Aabb {
     }
 
     /// The least box around both.
+    ///
+    /// A NaN yields to the number on the other side: after a union with a good box nothing shows that one was bad. So what may
+    /// not be [valid](Aabb::is_valid) is checked before.
     #[inline(always)]
     pub fn union(self, other: Aabb) -> Aabb {
         Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }

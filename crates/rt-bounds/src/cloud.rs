@@ -36,10 +36,10 @@ pub(crate) struct Cloud {
 }
 
 impl Cloud {
-    /// `None` where there are no points, or where one is not finite.
-    pub(crate) fn new<V: Vector>(points: &[V]) -> Option<Cloud> {
+    /// `None` where there are no points, or where one is not finite, or the `origin` of what is to be fitted.
+    pub(crate) fn new<V: Vector>(points: &[V], origin: DVec3) -> Option<Cloud> {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let mut finite = true;
+        let mut finite = origin.is_finite();
         for p in points {
             let p = p.widen();
             finite &= p.is_finite();
@@ -91,15 +91,15 @@ mod tests {
     #[test]
     fn clouds_of_any_size_are_about_one() {
         for size in [5e-324, 1e-300, 1e-30, 1.0, 1e30, 1e300, f64::MAX] {
-            let cloud = Cloud::new(&[DVec3::splat(-size), DVec3::new(size, 0.0, size)]).unwrap();
+            let cloud = Cloud::new(&[DVec3::splat(-size), DVec3::new(size, 0.0, size)], DVec3::ZERO).unwrap();
             assert!(cloud.points.iter().all(|p| p.is_finite()));
             assert!(cloud.points[1].x < 1e8);
             let back = cloud.place(cloud.points[1], DVec3::ZERO);
             assert!((back.x / size - 1.0).abs() < 1e-15 || size < 1e-300, "{size:e} {back}");
         }
-        assert!(Cloud::new(&[DVec3::ONE, DVec3::splat(f64::NAN)]).is_none());
-        assert!(Cloud::new(&[DVec3::INFINITY]).is_none());
-        assert!(Cloud::new::<DVec3>(&[]).is_none());
+        assert!(Cloud::new(&[DVec3::ONE, DVec3::splat(f64::NAN)], DVec3::ZERO).is_none());
+        assert!(Cloud::new(&[DVec3::INFINITY], DVec3::ZERO).is_none());
+        assert!(Cloud::new::<DVec3>(&[], DVec3::ZERO).is_none());
     }
 
     #[test]

@@ -34,7 +34,7 @@ impl DAabb {
     /// The box of nothing.
     pub const EMPTY: DAabb = DAabb { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
-    /// The least box around both.
+    /// The least box around both. A NaN yields to the number on the other side, as in [`Aabb::union`].
     #[inline]
     pub fn union(self, other: DAabb) -> DAabb {
         DAabb { min: self.min.min(other.min), max: self.max.max(other.max) }
@@ -74,18 +74,24 @@ impl DAabb {
     /// This box, to which `map` carried what lies in `here`, grown by eight times the error of carrying its corners there and
     /// back ([`Transform::point_with_error`]), seen from this side: rays that start as near as the box is large are off by less.
     pub fn room(self, here: DAabb, map: &Transform) -> DAabb {
+        let by = self.doubt(here, map);
+        DAabb { min: self.min - by, max: self.max + by }
+    }
+
+    /// How far [`DAabb::room`] grows the box on each side.
+    pub(crate) fn doubt(self, here: DAabb, map: &Transform) -> DVec3 {
         let off = |map: &Transform, b: DAabb| {
             let [low, high] = [b.min, b.max].map(|corner| map.point_with_error(corner, DVec3::ZERO).1);
             low + high
         };
         let back = map.linear().abs() * off(&map.inverse(), self);
-        let by = (off(map, here) + back) * 8.0;
-        DAabb { min: self.min - by, max: self.max + by }
+        (off(map, here) + back) * 8.0
     }
 
     /// Where the line of the ray is inside, of the ray's interval, each end rounded outward by at most `4` units in the last
     /// place; `None` where the ray does not meet the closed box. Whether it does is decided exactly: in `f64` almost always, by
-    /// exact products where that is in doubt.
+    /// exact products where that is in doubt. A ray that is not [valid](Ray::is_valid) meets no box, and no ray a box that is not:
+    /// one empty or inverted along any axis, all at infinity, or with a NaN.
     ///
     /// Exactly, where coordinates, components of the direction and ends of the interval, as far as they are neither zero nor
     /// infinite, lie between `2^-450` and `2^450` in size. Of what is larger a ray meets every box, along its whole interval; what
@@ -109,15 +115,24 @@ impl DAabb {
             enter = enter.max((near - o[a]) / d[a]);
             exit = exit.min((far - o[a]) / d[a]);
         }
+        // Asked of what seems to be met only: a NaN makes no comparison above a miss.
+        let sound = || {
+            let holds = self.min.cmple(self.max)
+                & self.min.cmplt(DVec3::INFINITY)
+                & self.max.cmpgt(DVec3::NEG_INFINITY);
+            let most = DVec3::MAX;
+            let finite = o.abs().cmple(most) & d.abs().cmple(most);
+            (holds & finite).all() && d != DVec3::ZERO && ray.t_min <= ray.t_max
+        };
         if !moderate {
-            return Some([ray.t_min, ray.t_max]);
+            return sound().then_some([ray.t_min, ray.t_max]);
         }
         // Two roundings each, of the difference and of the quotient, so the error is relative: what is certain of the greatest
         // entry and the least exit is certain of all.
         let doubt =
             |t: f64| if t.is_finite() { t.abs() * (2.0 * f64::EPSILON) + f64::MIN_POSITIVE } else { 0.0 };
         let (enter_doubt, exit_doubt) = (doubt(enter), doubt(exit));
-        if enter - enter_doubt > exit + exit_doubt {
+        if enter - enter_doubt > exit + exit_doubt || !sound() {
             return None;
         }
         let certain = enter + enter_doubt <= exit - exit_doubt;
@@ -211,4 +226,47 @@ fn sum_below(a: DVec3, b: DVec3) -> DVec3 {
         (x, _) => x,
     };
     DVec3::new(below(a.x, b.x), below(a.y, b.y), below(a.z, b.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_and_boxes_that_are_not_valid_do_not_meet() {
+        let unit = DAabb { min: DVec3::NEG_ONE, max: DVec3::ONE };
+        let ray = Ray::new(DVec3::ZERO, DVec3::new(1.0, 0.5, 0.0)).between(f64::NEG_INFINITY, f64::INFINITY);
+        assert!(unit.span(&ray).is_some());
+        let all = DAabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
+        for b in [unit, all] {
+            for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                for a in 0..3 {
+                    let mut v = DVec3::ZERO;
+                    v[a] = bad;
+                    assert_eq!(b.span(&Ray { origin: v, ..ray }), None);
+                    assert_eq!(b.span(&Ray { dir: v + DVec3::X, ..ray }), None);
+                }
+            }
+            assert_eq!(b.span(&Ray { dir: DVec3::ZERO, ..ray }), None);
+            for (t_min, t_max) in [(f64::NAN, 1.0), (0.0, f64::NAN), (1.0, 0.0)] {
+                assert_eq!(b.span(&ray.between(t_min, t_max)), None);
+            }
+        }
+        for a in 0..3 {
+            for origin in [DVec3::ZERO, DVec3::splat(1e200)] {
+                let ray = Ray { origin, ..ray };
+                let with = |min: f64, max: f64| {
+                    let mut b = all;
+                    (b.min[a], b.max[a]) = (min, max);
+                    b.span(&ray)
+                };
+                assert_eq!(with(f64::NAN, 1.0), None);
+                assert_eq!(with(-1.0, f64::NAN), None);
+                assert_eq!(with(1.0, -1.0), None);
+                assert_eq!(with(f64::INFINITY, f64::INFINITY), None);
+                assert_eq!(with(f64::NEG_INFINITY, f64::NEG_INFINITY), None);
+            }
+        }
+        assert_eq!(DAabb::EMPTY.span(&ray), None);
+    }
 }

@@ -90,14 +90,14 @@ impl<const K: usize> Kdop<K> {
         (self.planes[i], self.planes[Self::H + i])
     }
 
-    /// The k-DOP of some points, relative to `origin`; empty for none. A NaN in any point makes it all NaN, so that no bad
-    /// point hides; an infinite point makes it infinite.
+    /// The k-DOP of some points, relative to `origin`; empty for none. A NaN in any point or in `origin` makes it all NaN, so
+    /// that no bad point hides; an infinite one makes it infinite.
     ///
     /// Each point is inside in exact arithmetic, and each plane is the tightest `f32` plane that holds all points, unless
     /// `n . x` lies within `2^-50` of it, relative to the coordinates.
     pub fn from_points<V: Vector>(points: impl IntoIterator<Item = V>, origin: DVec3) -> Kdop<K> {
         let (mut lo, mut hi) = ([f64::INFINITY; 13], [f64::NEG_INFINITY; 13]);
-        let mut poisoned = false;
+        let mut poisoned = origin.is_nan();
         for p in points {
             let p = p.widen();
             poisoned |= p.is_nan();
@@ -158,6 +158,9 @@ impl<const K: usize> Kdop<K> {
 
     /// The least k-DOP around both: exactly that of the points of both, so repeated unions stay tight, and tightening planes
     /// against their neighbours (Coming and Staadt 2008) would gain nothing.
+    ///
+    /// A NaN plane yields to that of the other side: after a union with a good k-DOP nothing shows that one was bad. So what
+    /// may hold a NaN is checked before: it does not [contain](Kdop::contains) itself.
     #[inline]
     pub fn union(self, other: Kdop<K>) -> Kdop<K> {
         self.merged(other, f32::min, f32::max)
@@ -419,7 +422,7 @@ impl<const K: usize> BoundingVolume for Kdop<K> {
     type Ready = KdopRay<K>;
 
     fn around<V: Vector>(points: &[V], origin: DVec3) -> Option<Kdop<K>> {
-        let good = !points.is_empty() && points.iter().all(|p| p.widen().is_finite());
+        let good = origin.is_finite() && !points.is_empty() && points.iter().all(|p| p.widen().is_finite());
         good.then(|| Kdop::from_points(points.iter().copied(), origin))
     }
 

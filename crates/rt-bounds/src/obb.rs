@@ -4,7 +4,7 @@ mod fit;
 
 use crate::cloud::Cloud;
 use crate::unit_ray::{U, U32};
-use crate::{Aabb, BoundingVolume, UnitRay};
+use crate::{Aabb, BoundingVolume, DAabb, UnitRay};
 use rt_geom::glam::{DVec3, Vec3, Vec3A, Vec4, Vec4Swizzles};
 use rt_geom::{Ray, Real, Transform, Vector, f32_above, f32_below};
 
@@ -87,12 +87,10 @@ impl Obb {
         let (middle, half) = ((min + max) * 0.5, (max - min) * 0.5);
         let m = map.linear();
         let center = map.point(middle);
-        // A corner is off by a few roundings of the largest term, before they cancel, and of a ray moved into the box's
-        // space.
-        let spread = |v: DVec3| m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z;
-        let shift = map.affine().translation;
-        let terms = spread(middle.abs() + half) + shift.abs();
-        let error = terms * (8.0 * U) + (center.abs() + spread(half)) * (map.condition() * 64.0 * U).min(1.0);
+        // A corner is off by a few roundings of the terms by which the map carries it, before they cancel, and so is a ray
+        // moved into the box's space.
+        let spread = m.abs() * half;
+        let error = DAabb { min: center - spread, max: center + spread }.doubt((*b).into(), map);
         let place = (center - origin).as_vec3a();
         let reached = center.is_finite() && place.abs().max_element() as f64 <= FAR;
         if !reached || !normals.iter().all(|n| n.is_finite()) {
@@ -118,7 +116,8 @@ impl Obb {
 
     /// A box around some points, relative to `origin`, whose axes are those of their covariance: of the surface of
     /// `triangles`, which number the points, or, where there is no surface, of the points themselves. The axis-aligned
-    /// box where that is the better one. `None` for no points, or one not finite; triangles that name no points are
+    /// box where that is the better one. `None` for no points, or where one or `origin` is not
+    /// finite; triangles that name no points are
     /// passed over.
     ///
     /// The surface, not the points, so that finely divided parts pull no harder. Symmetric things, a cube, have no axes
@@ -129,27 +128,29 @@ impl Obb {
     /// Source: Gottschalk, Lin, Manocha, "OBBTree: a hierarchical structure for rapid interference detection", SIGGRAPH
     /// 1996.
     pub fn pca<V: Vector>(points: &[V], triangles: &[[u32; 3]], origin: DVec3) -> Option<Obb> {
-        let cloud = Cloud::new(points)?;
+        let cloud = Cloud::new(points, origin)?;
         Some(Obb::along(fit::pca(&cloud.points, triangles), &cloud, points, origin))
     }
 
     /// A box around some points, relative to `origin`, whose axes are an edge, the normal and what is across of one of
     /// seven triangles between extreme points: the one of least area around fourteen such points. The axis-aligned box
-    /// where that is the better one. `None` for no points, or one not finite.
+    /// where that is the better one. `None` for no points, or where one or `origin` is not
+    /// finite.
     ///
     /// Cost: five passes, one of them with seven dot products a point.
     ///
     /// Source: Larsson and Källberg, "Fast computation of tight-fitting oriented bounding boxes", Game Engine Gems 2
     /// (2011): DiTO-14.
     pub fn dito<V: Vector>(points: &[V], origin: DVec3) -> Option<Obb> {
-        let cloud = Cloud::new(points)?;
+        let cloud = Cloud::new(points, origin)?;
         Some(Obb::along(fit::dito(&cloud.points), &cloud, points, origin))
     }
 
     /// A box around some points, relative to `origin`, that no turn about one of its axes makes much smaller: started
     /// from the best of the axes that [`Obb::dito`] and [`Obb::pca`] look at and those of space, and turned until a
     /// thousandth is no longer gained. Where few points are extreme, faces along every two of their differences are
-    /// tried too. `None` for no points, or one not finite.
+    /// tried too. `None` for no points, or where one or `origin` is not
+    /// finite.
     ///
     /// About one axis the best turn is known: of all rectangles around points in a plane the least has a side along an
     /// edge of their convex hull. Turns are found for a few extreme points, and a point that the turned box leaves out
@@ -161,7 +162,7 @@ impl Obb {
     /// curve" (1975), taken about each axis in turn as Barequet and Har-Peled, "Efficiently approximating the
     /// minimum-volume bounding box" (2001), do; the growing set of points after Badoiu and Clarkson's core sets (2003).
     pub fn tight<V: Vector>(points: &[V], origin: DVec3) -> Option<Obb> {
-        let cloud = Cloud::new(points)?;
+        let cloud = Cloud::new(points, origin)?;
         Some(Obb::along(fit::tight(&cloud.points), &cloud, points, origin))
     }
 

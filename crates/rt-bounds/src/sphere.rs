@@ -64,30 +64,31 @@ impl BoundingSphere {
 
     /// A ball around some points, relative to `origin`: of the three pairs of points extreme along the axes the one
     /// farthest apart is the diameter, and every point outside makes the ball grow just enough. `None` for no points,
-    /// or one not finite.
+    /// or where one or `origin` is not finite.
     ///
     /// Cost: four passes over the points and a copy of them in `f64`.
     ///
     /// Source: Ritter, "An efficient bounding sphere", Graphics Gems (1990). His growth is in `f64` here, and a last
     /// pass shrinks the radius to the farthest point.
     pub fn ritter<V: Vector>(points: &[V], origin: DVec3) -> Option<BoundingSphere> {
-        let cloud = Cloud::new(points)?;
+        let cloud = Cloud::new(points, origin)?;
         Some(enclose(cloud.place(fit::ritter(&cloud.points).center, origin), points, origin))
     }
 
     /// A ball around some points, relative to `origin`: the smallest ball of points extreme along fixed directions,
-    /// grown by every point outside. `None` for no points, or one not finite.
+    /// grown by every point outside. `None` for no points, or where one or
+    /// `origin` is not finite.
     ///
     /// Cost: four passes, one of them with 3, 7 or 13 dot products a point.
     ///
     /// Source: Larsson, "Fast and tight fitting bounding spheres", SIGRAD 2008 (EPOS-6, -14, -26).
     pub fn epos<V: Vector>(points: &[V], origin: DVec3, of: Extremes) -> Option<BoundingSphere> {
-        let cloud = Cloud::new(points)?;
+        let cloud = Cloud::new(points, origin)?;
         Some(enclose(cloud.place(fit::epos(&cloud.points, of).center, origin), points, origin))
     }
 
     /// The smallest ball around some points, relative to `origin`, up to the rounding of its centre to `f32`. `None`
-    /// for no points, or one not finite.
+    /// for no points, or where one or `origin` is not finite.
     ///
     /// Coincident, collinear, coplanar and cospherical points are ordinary input.
     ///
@@ -96,7 +97,7 @@ impl BoundingSphere {
     /// Source: Welzl, "Smallest enclosing disks (balls and ellipsoids)" (1991), with the pivot rule of Gärtner, "Fast
     /// and robust smallest enclosing balls", ESA 1999: always add the farthest point.
     pub fn smallest<V: Vector>(points: &[V], origin: DVec3) -> Option<BoundingSphere> {
-        let cloud = Cloud::new(points)?;
+        let cloud = Cloud::new(points, origin)?;
         Some(enclose(cloud.place(fit::smallest(&cloud.points).center, origin), points, origin))
     }
 

@@ -12,8 +12,8 @@ pub trait BoundingVolume: Sized {
     /// A ray made ready, once, for all volumes of this kind.
     type Ready;
 
-    /// The volume around some points, relative to `origin`, rounded outward; `None` where there are none, or where one is not
-    /// finite.
+    /// The volume around some points, relative to `origin`, rounded outward; `None` where there are none, or where one or
+    /// `origin` is not finite.
     fn around<V: Vector>(points: &[V], origin: DVec3) -> Option<Self>;
 
     /// Prepares a [valid](Ray::is_valid) ray for volumes given relative to `origin` that all lie in `world`, itself relative to
@@ -42,7 +42,7 @@ impl BoundingVolume for Aabb {
             }
             (min, max) = (min.min(p), max.max(p));
         }
-        (!points.is_empty()).then(|| Aabb::from_f64(min, max, origin))
+        (origin.is_finite() && !points.is_empty()).then(|| Aabb::from_f64(min, max, origin))
     }
 
     #[inline]
@@ -70,6 +70,27 @@ impl BoundingVolume for Aabb {
 mod tests {
     use super::*;
     use rt_geom::glam::Vec3A;
+
+    #[test]
+    fn nothing_is_around_points_seen_from_no_place() {
+        fn check<B: BoundingVolume>() {
+            let points = [DVec3::ZERO, DVec3::ONE, DVec3::X];
+            assert!(B::around(&points, DVec3::ONE).is_some());
+            for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                for origin in [DVec3::X * bad, DVec3::new(0.0, bad, 0.0), DVec3::new(0.0, 0.0, bad)] {
+                    assert!(B::around(&points, origin).is_none(), "{origin}");
+                }
+            }
+        }
+        check::<Aabb>();
+        check::<crate::BoundingSphere>();
+        check::<crate::Obb>();
+        check::<crate::Kdop<14>>();
+        let origin = DVec3::new(0.0, f64::NAN, 0.0);
+        assert!(crate::BoundingSphere::ritter(&[DVec3::ONE], origin).is_none());
+        assert!(crate::BoundingSphere::epos(&[DVec3::ONE], origin, crate::Extremes::Six).is_none());
+        assert!(crate::Kdop::<6>::from_points([DVec3::ONE], origin).extent(0).0.is_nan());
+    }
 
     #[test]
     fn a_box_around_points() {

@@ -4,7 +4,7 @@
 
 #![allow(clippy::print_stdout)] // Figures, for `--nocapture`.
 
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, Obb};
 use rt_geom::glam::{BVec3, DAffine3, DMat3, DVec3, Vec3A};
 use rt_geom::{Motion, Transform};
 use rt_measure::rays::Seeded;
@@ -89,6 +89,63 @@ fn what_is_not_a_finite_box() {
     let huge = Aabb::new(Vec3A::splat(-3e38), Vec3A::splat(3e38));
     assert!(huge.moving(&motion, [0.0, 1.0], DVec3::ZERO).contains(huge));
     assert!(!Aabb::new(Vec3A::NAN, Vec3A::NAN).moving(&motion, [0.0, 1.0], DVec3::ZERO).is_valid());
+}
+
+/// A turn about a far pivot, before and after which it moves: its matrix hides how far the pivot is.
+fn about(pivot: DVec3, axis: DVec3, angle: f64) -> Transform {
+    let turn = Transform::rotation(axis, angle).unwrap();
+    let to = Transform::translation(pivot).inverse();
+    to.then(&turn).unwrap().then(&Transform::translation(turn.point(pivot))).unwrap()
+}
+
+#[test]
+fn oriented_and_moving_boxes_hold_what_turns_about_a_far_pivot() {
+    let mut seeded = Seeded::new(44);
+    let unit = Aabb::new(Vec3A::NEG_ONE, Vec3A::ONE);
+    for i in 0..cases(2000) {
+        let far = [1e3, 1e6, 1e9, 1e12][i % 4];
+        let pivot = seeded.inside(DVec3::splat(-far), DVec3::splat(far));
+        let (axis, angle) = (seeded.direction(), seeded.between(-3.0, 3.0));
+        let map = about(pivot, axis, angle);
+        let obb = Obb::carried(&unit, &map, DVec3::ZERO).unwrap();
+        // A thin box shows the roundings that room for the rest would hide.
+        let motion = Motion::new(map, about(pivot * 0.5, axis, angle + seeded.between(0.0, 0.5))).unwrap();
+        let p = seeded.direction();
+        let point = Aabb::new(p.as_vec3a(), p.as_vec3a());
+        let swept = point.moving(&motion, [0.0, 1.0], DVec3::ZERO);
+        for corner in unit.corners() {
+            let x = map.point(corner.as_dvec3());
+            for (normal, center, half) in obb.slabs() {
+                assert!(
+                    normal.dot(x - center).abs() <= half * (1.0 + 1e-15),
+                    "{far:e} {normal} {}",
+                    x - center
+                );
+            }
+        }
+        for time in [0.0, 1.0, seeded.unit()] {
+            let x = motion.at(time).point(point.min.as_dvec3());
+            let inside = swept.min.as_dvec3().cmple(x) & x.cmple(swept.max.as_dvec3());
+            assert!(inside.all(), "{far:e} {time} {swept:?} {x}");
+        }
+    }
+}
+
+#[test]
+fn moving_boxes_are_never_inverted() {
+    let unit = Aabb::new(Vec3A::NEG_ONE, Vec3A::ONE);
+    let turn = Transform::rotation(DVec3::ONE, 2.0).unwrap();
+    for size in [1e-300, 1e300, 3e306] {
+        let start = Transform::scale(DVec3::splat(size))
+            .unwrap()
+            .then(&Transform::translation(DVec3::splat(size)))
+            .unwrap();
+        let motion = Motion::new(start, start.then(&turn).unwrap()).unwrap();
+        for b in [unit, Aabb::new(Vec3A::splat(-3e38), Vec3A::splat(3e38))] {
+            let swept = b.moving(&motion, [0.0, 1.0], DVec3::ZERO);
+            assert!(swept.is_valid(), "{size:e} {swept:?}");
+        }
+    }
 }
 
 #[test]

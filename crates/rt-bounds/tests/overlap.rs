@@ -6,7 +6,7 @@
 
 use rt_bounds::{Aabb, BeamTest, ConeTest};
 use rt_geom::glam::{DMat3, DQuat, DVec3, Vec3A};
-use rt_geom::{Beam, Cone, Ray};
+use rt_geom::{Beam, Cone, ConeError, Ray};
 use rt_measure::rays::Seeded;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -350,6 +350,52 @@ fn degenerate_beams_and_boxes() {
     assert_eq!(Beam::from_apex(DVec3::Z, &square), Err(rt_geom::BeamError::Flat));
     assert_eq!(Beam::parallel(&square, DVec3::X), Err(rt_geom::BeamError::Flat));
     assert_eq!(Beam::from_apex(DVec3::NAN, &square), Err(rt_geom::BeamError::NotFinite));
+}
+
+#[test]
+fn cones_around_rays_of_any_length() {
+    let unit = Cone::around(&Ray::new(DVec3::ZERO, DVec3::X).between(0.5, 10.0), 0.1, 0.1).unwrap();
+    for e in [-1060, -700, -300, 300, 700, 1000] {
+        // In two steps, for the range of the power itself.
+        let power = |e: i32| 2f64.powi(e / 2) * 2f64.powi(e - e / 2);
+        let ends = if e < -1000 {
+            [0.5f64 * 2f64.powi(1000), 10.0 * 2f64.powi(1000)]
+        } else {
+            [0.5 * power(-e), 10.0 * power(-e)]
+        };
+        let ray = Ray::new(DVec3::ZERO, DVec3::X * power(e)).between(ends[0], ends[1]);
+        let cone = Cone::around(&ray, 0.1, 0.1).unwrap();
+        let expected = if e < -1000 { unit.range().map(|x| x * 2f64.powi(e + 1000)) } else { unit.range() };
+        assert_eq!((cone.range(), cone.axis()), (expected, DVec3::X), "{e}");
+    }
+    let ray = Ray::new(DVec3::ZERO, DVec3::X);
+    for (a, b) in [(f64::NAN, 1.0), (0.0, f64::NAN), (2.0, 1.0)] {
+        assert_eq!(Cone::around(&ray.between(a, b), 1.0, 0.1), Err(ConeError::Interval));
+    }
+    assert_eq!(Cone::around(&Ray { dir: DVec3::ZERO, ..ray }, 1.0, 0.1), Err(ConeError::NoAxis));
+    assert_eq!(Cone::around(&Ray { dir: DVec3::NAN, ..ray }, 1.0, 0.1), Err(ConeError::NoAxis));
+    assert_eq!(Cone::around(&Ray { origin: DVec3::NAN, ..ray }, 1.0, 0.1), Err(ConeError::NotFinite));
+}
+
+#[test]
+fn beams_through_polygons_of_any_size() {
+    let corners = [[1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [-1.0, -1.0, 1.0]].map(DVec3::from_array);
+    let dented = [corners[0], corners[1], DVec3::new(0.1, 0.1, 1.0), corners[2]];
+    let (one, along) =
+        (Beam::from_apex(DVec3::ZERO, &corners).unwrap(), Beam::parallel(&corners, DVec3::Z).unwrap());
+    for e in [-1000, -600, -60, 60, 600, 1000] {
+        let size = 2f64.powi(e);
+        let beam = Beam::from_apex(DVec3::ZERO, &corners.map(|p| p * size)).unwrap();
+        assert_eq!(beam, one, "{e}");
+        let moved = Beam::from_apex(DVec3::splat(size), &corners.map(|p| (p + 1.0) * size)).unwrap();
+        assert!(moved.sides().zip(one.sides()).all(|((a, _), (b, _))| a == b), "{e}");
+        let beam = Beam::parallel(&corners.map(|p| p * size), DVec3::Z).unwrap();
+        assert!(beam.sides().zip(along.sides()).all(|((a, p), (b, q))| a == b && p == q * size), "{e}");
+        let error = Beam::from_apex(DVec3::ZERO, &dented.map(|p| p * size));
+        assert_eq!(error, Err(rt_geom::BeamError::NotConvex), "{e}");
+        let error = Beam::parallel(&dented.map(|p| p * size), DVec3::Z);
+        assert_eq!(error, Err(rt_geom::BeamError::NotConvex), "{e}");
+    }
 }
 
 #[test]

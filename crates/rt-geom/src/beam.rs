@@ -1,5 +1,7 @@
 //! [`Beam`]: a ray with a polygonal width.
 
+use crate::direction::{length, scaled};
+use crate::invert::ldexp;
 use crate::{Ray, Transform, unit};
 use core::fmt;
 use glam::DVec3;
@@ -65,6 +67,9 @@ impl Beam {
     pub fn from_apex(apex: DVec3, polygon: &[DVec3]) -> Result<Beam, BeamError> {
         let arms: Vec<DVec3> = polygon.iter().map(|&q| q - apex).collect();
         let plane = across(&arms)?;
+        // Each of length about 1, exactly in its direction, so that no product leaves the range.
+        let arms = arms.iter().map(|&arm| scaled(arm).map(|(arm, _)| arm));
+        let arms: Vec<DVec3> = arms.collect::<Option<_>>().ok_or(BeamError::Flat)?;
         // On the side where the polygon is, so that depths grow towards it.
         let depth = if arms[0].dot(plane) < 0.0 { -plane } else { plane };
         let corners: Vec<_> = arms.iter().map(|&arm| Ray::new(apex, arm / arm.dot(depth))).collect();
@@ -94,9 +99,12 @@ impl Beam {
         if corners.len() < 3 {
             return Err(BeamError::Flat);
         }
-        // At depth 1, relative to the first origin.
+        // At depth 1, relative to the first origin; where all go one way at depth 0, for beside a long direction a small
+        // polygon would be lost.
+        let parallel = corners.iter().all(|c| c.dir == corners[0].dir);
         let sections = |corners: &[Ray<f64>]| -> Vec<DVec3> {
-            corners.iter().map(|c| c.origin - corners[0].origin + c.dir).collect()
+            let ahead = |c: &Ray<f64>| if parallel { DVec3::ZERO } else { c.dir };
+            corners.iter().map(|c| c.origin - corners[0].origin + ahead(c)).collect()
         };
         let area = across(&sections(&corners))?;
         if area.dot(depth) < 0.0 {
@@ -104,15 +112,18 @@ impl Beam {
         }
         let sections = sections(&corners);
         let n = corners.len();
+        // Corners that are meant to lie in one plane may be off by the rounding of the cross product and of the
+        // sections, and where the beam is parallel of the origins, which were moved into one plane.
+        let moved = |c: &Ray<f64>| if parallel { length(c.origin) } else { 0.0 };
+        let size = sections.iter().zip(&corners).fold(0.0f64, |m, (&s, c)| m.max(length(s)).max(moved(c)));
         let mut normals = Vec::with_capacity(n);
         for i in 0..n {
             let (a, b) = (sections[i], sections[(i + 1) % n]);
             // In the parallel beam a and b differ by the edge, in the other one the edge spans the same plane with
             // either arm.
-            let normal = unit((b - a).cross(corners[i].dir)).ok_or(BeamError::Flat)?;
-            // Corners that are meant to lie in one plane may be off by the rounding of the cross product and of the
-            // sections.
-            let size = sections.iter().fold(0.0f64, |m, s| m.max(s.length()));
+            let (edge, arm) = (scaled(b - a), scaled(corners[i].dir));
+            let (edge, arm) = edge.zip(arm).ok_or(BeamError::Flat)?;
+            let normal = unit(edge.0.cross(arm.0)).ok_or(BeamError::Flat)?;
             if sections.iter().any(|&s| normal.dot(s - a) > size * (32.0 * f64::EPSILON)) {
                 return Err(BeamError::NotConvex);
             }
@@ -170,13 +181,20 @@ impl Beam {
     }
 }
 
-/// The direction across a polygon, by the areas of its projections.
+/// The direction across a polygon, by the areas of its projections: of the polygon scaled by a power of two, so that no
+/// square leaves the range, however small or large it is.
 fn across(points: &[DVec3]) -> Result<DVec3, BeamError> {
     if !points.iter().all(|p| p.is_finite()) {
         return Err(BeamError::NotFinite);
     }
     let fan = points.get(1..).unwrap_or(&[]);
     let first = points.first().copied().unwrap_or(DVec3::ZERO);
-    let area: DVec3 = fan.windows(2).map(|w| (w[0] - first).cross(w[1] - first)).sum();
+    let edges: Vec<DVec3> = fan.iter().map(|&p| p - first).collect();
+    let widest = edges.iter().fold(DVec3::ZERO, |m, e| m.max(e.abs()));
+    let Some((_, exponent)) = scaled(widest) else {
+        return Err(if widest == DVec3::ZERO { BeamError::Flat } else { BeamError::NotFinite });
+    };
+    let edges: Vec<DVec3> = edges.iter().map(|e| e.to_array().map(|x| ldexp(x, -exponent)).into()).collect();
+    let area: DVec3 = edges.windows(2).map(|w| w[0].cross(w[1])).sum();
     unit(area).ok_or(if area.is_finite() { BeamError::Flat } else { BeamError::NotFinite })
 }

@@ -1,5 +1,7 @@
 //! [`Cone`]: a ray with a circular width.
 
+use crate::direction::scaled;
+use crate::invert::ldexp;
 use crate::{Ray, Real, Vector, unit};
 use core::f64::consts::{FRAC_PI_2, PI};
 use core::fmt;
@@ -42,6 +44,8 @@ pub enum ConeError {
     NoAxis,
     /// The angle is not in `[0, pi]`, or the spread or the radius negative or not finite.
     Width,
+    /// The interval of the ray is empty or NaN.
+    Interval,
 }
 
 impl fmt::Display for ConeError {
@@ -50,6 +54,7 @@ impl fmt::Display for ConeError {
             ConeError::NotFinite => "the origin of the cone is not finite",
             ConeError::NoAxis => "the axis of the cone has no direction",
             ConeError::Width => "the width of the cone is negative, too large, or not finite",
+            ConeError::Interval => "the ray of the cone has no interval",
         })
     }
 }
@@ -84,18 +89,25 @@ impl Cone {
     ///
     /// # Errors
     ///
-    /// See [`ConeError`].
+    /// See [`ConeError`]; a ray that is not [valid](Ray::is_valid) has no cone.
     pub fn around<R: Real>(ray: &Ray<R>, radius: f64, spread: f64) -> Result<Cone, ConeError> {
         let finite = 0.0..=f64::MAX;
         if !(finite.contains(&radius) && finite.contains(&spread)) {
             return Err(ConeError::Width);
         }
         let dir = ray.dir.widen();
-        let length = dir.length();
         let (near, far): (f64, f64) = (ray.t_min.into(), ray.t_max.into());
         let cos = 1.0 / spread.hypot(1.0);
         let cone = Cone::new(ray.origin.widen(), dir, 0.0)?;
-        let (near, far) = ((near * length).max(0.0), far * length);
+        let ordered = near <= far;
+        if !ordered {
+            return Err(ConeError::Interval);
+        }
+        // By a power of two first: neither the square of a direction nor `t` times a part of it leaves the range where
+        // the distance does not.
+        let (scaled, exponent) = scaled(dir).ok_or(ConeError::NoAxis)?;
+        let distance = |t: f64| ldexp(t, exponent) * scaled.length();
+        let (near, far) = (distance(near).max(0.0), distance(far));
         Ok(Cone { sin: spread.min(f64::MAX) * cos, cos, radius, near, far, ..cone })
     }
 

@@ -16,7 +16,7 @@ pub fn unit(v: DVec3) -> Option<DVec3> {
 }
 
 /// `v` times a power of two that brings its square into range, and the exponent that takes it back.
-fn scaled(v: DVec3) -> Option<(DVec3, i32)> {
+pub(crate) fn scaled(v: DVec3) -> Option<(DVec3, i32)> {
     let largest = v.abs().max_element();
     if !v.is_finite() || largest == 0.0 {
         return None;
@@ -26,7 +26,7 @@ fn scaled(v: DVec3) -> Option<(DVec3, i32)> {
 }
 
 /// The length of a finite vector, however short.
-fn length(v: DVec3) -> f64 {
+pub(crate) fn length(v: DVec3) -> f64 {
     scaled(v).map_or(0.0, |(v, e)| ldexp(v.length(), e))
 }
 

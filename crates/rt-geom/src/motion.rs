@@ -4,6 +4,18 @@ use crate::invert::invert;
 use crate::{Parts, Transform, TransformError};
 use glam::{DMat3, DQuat, DVec3};
 
+/// Beyond this size of a translation, a stretch or its inverse a motion is refused: so no sum of a few of them overflows.
+const LARGE: f64 = f64::MAX / 16.0;
+
+/// How much the condition that [`Transform::new`] refuses may exceed `|S| |S^-1|`, in Frobenius norms, between two
+/// stretches whose norms these bound.
+///
+/// With rows and columns brought to size 1 by powers of two, entry `i, j` of `|A^-1| |A|` is at most `2 sqrt(3) |a'_i|
+/// |a_i|` for the row `a'_i` of the inverse and the column `a_i`, hence a row sum at most `6 sqrt(3) < 10.4` times their
+/// product. Up to [`Transform::MAX_CONDITION`] the rounding of `R S` changes that by less than a hundredth. The norm of
+/// [`Transform::condition`] needs a factor of 3 only.
+const ROOM: f64 = 12.0;
+
 /// The way from one transform at time 0 to another at time 1: translation and stretch go straight, the rotation turns
 /// the shorter way at constant speed.
 ///
@@ -40,10 +52,16 @@ impl Motion {
     ///
     /// # Errors
     ///
+    /// [`TransformError::NotFinite`] when a translation is not finite, or a translation or a stretch so large or so
+    /// small that something between may leave the range of `f64`.
     /// [`TransformError::Mirrors`] when one of them swaps handedness and the other does not.
-    /// [`TransformError::Singular`] when their stretches differ so that something between may have a condition above
-    /// [`Transform::MAX_CONDITION`].
+    /// [`TransformError::Singular`] when their stretches are such, or differ so, that something between may have a
+    /// condition above [`Transform::MAX_CONDITION`]: from a stretch of about `1 : 8e10` on, for what turns between.
     pub fn new(start: Transform, end: Transform) -> Result<Motion, TransformError> {
+        let within = |v: DVec3| v.abs().cmple(DVec3::splat(LARGE)).all();
+        if !(within(start.affine().translation) && within(end.affine().translation)) {
+            return Err(TransformError::NotFinite);
+        }
         if start.swaps_handedness() != end.swaps_handedness() {
             return Err(TransformError::Mirrors);
         }
@@ -59,7 +77,10 @@ impl Motion {
         let across = if sin == 0.0 { b * 0.0 } else { (b - a * cos) * (1.0 / sin) };
         let size = frobenius(from.stretch).max(frobenius(to.stretch));
         let back = frobenius(invert(from.stretch)?.inverse).max(frobenius(invert(to.stretch)?.inverse));
-        let condition = size * back;
+        if !(size <= LARGE && back <= LARGE && from.rotation.is_finite() && across.is_finite()) {
+            return Err(TransformError::NotFinite);
+        }
+        let condition = size * back * ROOM;
         if condition > Transform::MAX_CONDITION || condition.is_nan() {
             return Err(TransformError::Singular { condition });
         }
@@ -83,8 +104,10 @@ impl Motion {
             rotation: (self.from.rotation * cos + self.across * sin).normalize(),
             stretch: self.from.stretch * (1.0 - time) + self.to.stretch * time,
         };
-        // Never refused: the constructor has seen to it.
-        parts.transform().unwrap_or(self.start)
+        // Never refused: the constructor has seen to it. Were it refused, no answer would be better than a wrong one.
+        let map = parts.transform();
+        debug_assert!(map.is_ok(), "{map:?} within {:e}", self.condition);
+        map.unwrap_or(Transform::NOWHERE)
     }
 
     /// The curve along which the motion carries the point `p`.
@@ -101,7 +124,9 @@ impl Motion {
             sin: [mixed * v, mixed * dv],
             angle: 2.0 * self.half_angle,
             size: (self.from.translation.abs().max(self.to.translation.abs()))
-                + DVec3::splat(frobenius(self.from.stretch).max(frobenius(self.to.stretch)) * p.length()),
+                + DVec3::splat(frobenius(self.from.stretch).max(frobenius(self.to.stretch)) * p.length())
+                // The ends are kept as they were given, and what cancels in them is in no part.
+                + self.start.terms(p).max(self.end.terms(p)),
         }
     }
 
@@ -115,7 +140,8 @@ impl Motion {
         &self.end
     }
 
-    /// A bound on the condition of every transform of the motion.
+    /// A bound on the condition of every transform between, in the norm of [`Transform::condition`] and in that by
+    /// which [`Transform::new`] refuses.
     pub fn condition(&self) -> f64 {
         self.condition
     }
@@ -141,7 +167,8 @@ pub struct Path {
     pub sin: [DVec3; 2],
     /// The angle turned in all, in `[0, pi]` but for rounding.
     pub angle: f64,
-    /// The size of the terms the curve was made from: it is off by at most `64 u` times this.
+    /// The size of the terms the curve was made from, and of those by which the maps at both ends carry the point: the
+    /// curve and [`Motion::at`] are off by at most `64 u` times this.
     pub size: DVec3,
 }
 

@@ -88,6 +88,10 @@ impl Transform {
         after: DVec3::ZERO,
     };
 
+    /// Where nothing is: every point goes to NaN.
+    pub(crate) const NOWHERE: Transform =
+        Transform { linear: DMat3::NAN, inverse: DMat3::NAN, before: DVec3::NAN, after: DVec3::NAN };
+
     /// The greatest condition a linear part may have, after its rows and columns were brought to size 1: stretches
     /// along the axes of either side are free, however large; turned both before and after, a stretch may be up to
     /// about `1 : 1e12`.
@@ -117,7 +121,11 @@ impl Transform {
         Ok(Transform { linear: inverted.matrix, inverse: inverted.inverse, before, after })
     }
 
-    /// Moves everything by `by`, which is finite.
+    /// Moves everything by `by`, which should be finite.
+    ///
+    /// One that is not makes a map that carries no point to a finite one. [`Transform::then`] and
+    /// [`Motion::new`](crate::Motion::new) refuse such a map with [`TransformError::NotFinite`], as [`Transform::new`]
+    /// refuses its matrix; [`Transform::point_with_error`] answers that the error is infinite.
     pub fn translation(by: DVec3) -> Transform {
         Transform { after: by, ..Transform::IDENTITY }
     }
@@ -212,9 +220,15 @@ impl Transform {
             return (result, DVec3::INFINITY);
         }
         let size = self.linear.abs();
-        let rounding = (size * s.abs() + self.after.abs()) * gamma(7);
+        let rounding = self.terms(p) * gamma(7);
         let underflow = (s.abs().element_sum() + 1.0) * LEAST;
         (result, rounding + size * error.abs() * (1.0 + gamma(7)) + underflow)
+    }
+
+    /// The size of the terms whose sum a carried point is, before they cancel: `|A| |p + a| + |b|`. Of a turn about a
+    /// far pivot they are as large as the pivot is far, though the [matrix](Transform::affine) shows none of it.
+    pub(crate) fn terms(&self, p: DVec3) -> DVec3 {
+        self.linear.abs() * (p + self.before).abs() + self.after.abs()
     }
 
     /// A vector carried over: differences of points.

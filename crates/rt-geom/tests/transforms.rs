@@ -505,6 +505,54 @@ fn paths_are_where_motions_carry_points() {
 }
 
 #[test]
+fn thin_motions_are_refused_or_made_but_never_stand_still() {
+    let mut seeded = Seeded::new(23);
+    let (mut made, mut refused) = (0, 0);
+    for _ in 0..cases(3000) {
+        let stretch = 10f64.powf(seeded.between(9.5, 12.0));
+        let mut turn = || Transform::rotation(seeded.direction(), seeded.between(0.5, 2.5)).unwrap();
+        let flat = Transform::scale(DVec3::new(1.0, 1.0 / stretch, 1.0)).unwrap();
+        let Ok(start) = turn().then(&flat).and_then(|map| map.then(&turn())) else { continue };
+        let Ok(end) = start.then(&turn()) else { continue };
+        match Motion::new(start, end) {
+            Err(error) => {
+                assert!(matches!(error, TransformError::Singular { .. }) && stretch > 2e10, "{error}");
+                refused += 1;
+            }
+            Ok(motion) => {
+                let (path, time) = (motion.path(DVec3::X), seeded.between(0.1, 0.9));
+                let map = motion.at(time);
+                let off = (map.point(DVec3::X) - path.at(time)).abs();
+                assert!(off.cmple(path.size * (32.0 * f64::EPSILON)).all(), "{stretch:e} {time}");
+                assert!(map != start && map.condition() <= motion.condition(), "{stretch:e}");
+                made += 1;
+            }
+        }
+    }
+    assert!(made > 100 && refused > 100, "{made} {refused}");
+}
+
+#[test]
+fn motions_between_numbers_without_end_are_refused() {
+    for far in [f64::NAN, f64::INFINITY, f64::MAX] {
+        let moved = Transform::translation(DVec3::new(0.0, far, 0.0));
+        assert_eq!(Motion::new(Transform::IDENTITY, moved), Err(TransformError::NotFinite));
+        assert_eq!(Motion::new(moved.inverse(), Transform::IDENTITY), Err(TransformError::NotFinite));
+        if !far.is_finite() {
+            assert_eq!(moved.then(&Transform::IDENTITY), Err(TransformError::NotFinite));
+            assert_eq!(Transform::IDENTITY.then(&moved), Err(TransformError::NotFinite));
+            assert_eq!(Transform::new(moved.affine()), Err(TransformError::NotFinite));
+        }
+    }
+    for size in [1e-306, 1e306] {
+        let map = Transform::scale(DVec3::splat(size)).unwrap();
+        let turned = map.then(&Transform::rotation(DVec3::ONE, 1.0).unwrap()).unwrap();
+        let half = Motion::new(map, turned).unwrap().at(0.5).vector(DVec3::X);
+        assert!((half.abs().max_element() / size - 0.9).abs() < 0.1, "{half}");
+    }
+}
+
+#[test]
 fn angles_keep_their_digits_at_both_ends() {
     for angle in [1e-300f64, 1e-17, 1e-8, 0.3, 1.0, 2.0, PI - 1e-3] {
         let b = DVec3::new(angle.cos(), angle.sin(), 0.0);
