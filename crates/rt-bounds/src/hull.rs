@@ -23,7 +23,9 @@ use std::collections::HashSet;
 ///
 /// Cost: `O(n F)` for `n` points that are not clearly inside and `F` facets, after a pass that drops those that are (a plane
 /// test for each of some hundred planes): 10^5 points in a ball in 0.3 s, 10^4 points on a sphere in 0.9 s, 10^5 on
-/// a sphere in minutes. [`Polytope`]'s `around` never takes that long.
+/// a sphere in minutes. Points that only roundings keep from a common plane cost little more, as they are told apart by their
+/// heights above it: a turned circle of 4000 points (7996 facets) takes 0.2 s, a turned cylinder of 4000 0.8 s. [`Polytope`]'s
+/// `around` looks at no more than 602 points in that way.
 ///
 /// Source: Chand and Kapur, "An algorithm for convex polytopes", JACM 17(1) (1970); the exact signs after Shewchuk (1997). The
 /// least turning angle is not computed: a facet is the plane that has all points on one side.

@@ -246,6 +246,40 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn seen_along_a_plane_no_side_is_wrong(p in prop::array::uniform4(prop::array::uniform3(any::<i32>())),
+                                               noise in prop::array::uniform4(-3i32..=3), shift in -150i32..=130,
+                                               along in prop::array::uniform3(-1.0f64..1.0), near: bool) {
+            let mut p = p;
+            for (q, step) in p.iter_mut().zip(noise) {
+                q[2] = (q[0] >> 1) - (q[1] >> 2) + step;
+            }
+            let at = p.map(|v| point(v, 2f64.powi(shift)));
+            let normal = if near { DVec3::new(-0.5, 0.25, 1.0) } else { DVec3::from_array(along) };
+            prop_assume!(normal != DVec3::ZERO);
+            let sheared = Sheared::new(&at, normal);
+            let side = sheared.plane(0, 1, 2).side(&sheared.at[3], &sheared.rest[3]) as i128;
+            prop_assert!(side == 0 || side == volume(p).signum());
+        }
+    }
+
+    /// Heights of some roundings, told by `f64` alone.
+    #[test]
+    fn seen_along_a_plane_roundings_are_told() {
+        let turned = |x: f64, y: f64| DVec3::new(0.6 * x, y, 0.8 * x + 0.3 * y);
+        let at: Vec<DVec3> = (0..200).map(|i| turned((i as f64).cos(), (i as f64).sin())).collect();
+        let sheared = Sheared::new(&at, normal(at[0], at[2], at[4]));
+        let (plane, filter) = (Plane::new(at[0], at[2], at[4], DVec3::splat(2.0)), sheared.plane(0, 2, 4));
+        let told = |i: &usize| filter.side(&sheared.at[*i], &sheared.rest[*i]) != 0;
+        let others = || (5..200).filter(|i| plane.side_exactly(at[*i]) != 0);
+        assert!(others().all(|i| {
+            let side = filter.side(&sheared.at[i], &sheared.rest[i]);
+            side == 0 || side == plane.side_exactly(at[i])
+        }));
+        assert!(others().filter(told).count() * 10 > others().count() * 9 && others().count() > 100);
+    }
+
     #[test]
     fn a_point_one_step_off_a_plane() {
         let (a, b, c) = (DVec3::splat(0.1), DVec3::new(0.7, 0.1, 0.1), DVec3::new(0.1, 0.9, 0.1));
