@@ -207,6 +207,7 @@ impl Stage {
         let volumes: Vec<V> = self.objects.iter().map(fit).collect::<Option<_>>()?;
         let build_ms = begin.elapsed().as_secs_f64() * 1e3 / self.objects.len() as f64;
         let area = volumes.iter().map(V::surface_area).sum::<f64>() / volumes.len() as f64;
+        let bytes = volumes.iter().map(V::bytes).sum::<usize>() as f64 / volumes.len() as f64;
         let make = move |ray: &Ray| V::ready(ray, DVec3::ZERO, &self.world);
         let ready: std::rc::Rc<Vec<V::Ready>> = std::rc::Rc::new(self.rays.iter().map(make).collect());
         let volumes = std::rc::Rc::new(volumes);
@@ -260,7 +261,6 @@ impl Stage {
                 black_box(make(ray));
             }
         });
-        let bytes = size_of::<V>() as f64;
         Some(Entrant {
             name,
             params,

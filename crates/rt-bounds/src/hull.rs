@@ -6,7 +6,7 @@ mod polytope;
 pub use polytope::{Polytope, PolytopeRay};
 
 use core::fmt;
-use exact::{Plane, collinear, turn};
+use exact::{Plane, Sheared, collinear, turn};
 use rt_geom::Vector;
 use rt_geom::glam::DVec3;
 use std::collections::HashSet;
@@ -23,7 +23,9 @@ use std::collections::HashSet;
 ///
 /// Cost: `O(n F)` for `n` points that are not clearly inside and `F` facets, after a pass that drops those that are (a plane
 /// test for each of some hundred planes): 10^5 points in a ball in 0.3 s, 10^4 points on a sphere in 0.9 s, 10^5 on
-/// a sphere in minutes. [`Polytope`]'s `around` never takes that long.
+/// a sphere in minutes. Points that only roundings keep from a common plane cost little more, as they are told apart by their
+/// heights above it: a turned circle of 4000 points (7996 facets) takes 0.2 s, a turned cylinder of 4000 0.8 s. [`Polytope`]'s
+/// `around` looks at no more than 602 points in that way.
 ///
 /// Source: Chand and Kapur, "An algorithm for convex polytopes", JACM 17(1) (1970); the exact signs after Shewchuk (1997). The
 /// least turning angle is not computed: a facet is the plane that has all points on one side.
@@ -285,7 +287,7 @@ struct Shape {
 
 /// Gift wrapping of different points, at least one.
 fn wrap(at: &[DVec3]) -> Shape {
-    let wrapping = Wrapping { at, reach: reach(at.iter().copied()) };
+    let mut wrapping = Wrapping { at, reach: reach(at.iter().copied()), sheared: Sheared::new(at, DVec3::Z) };
     let mut facets = match wrapping.first() {
         First::Line(mut ends) => {
             ends.dedup();
@@ -339,6 +341,8 @@ fn number(facets: &[Vec<u32>]) -> Shape {
 struct Wrapping<'a> {
     at: &'a [DVec3],
     reach: DVec3,
+    /// The points as seen along a facet that had many of them close to its plane.
+    sheared: Sheared,
 }
 
 /// Where wrapping begins.
@@ -361,9 +365,10 @@ impl Wrapping<'_> {
     ///
     /// A plane through the highest point that contains the direction of y is turned about that direction until it meets another
     /// point: seen along y, the first step of wrapping in two dimensions. What lies in that plane is a facet or an edge.
-    fn first(&self) -> First {
+    fn first(&mut self) -> First {
         let count = self.at.len() as u32;
-        let p = |i: u32| self.at[i as usize];
+        let at = self.at;
+        let p = |i: u32| at[i as usize];
         let height = |i: u32| [p(i).z, p(i).x, p(i).y];
         let top = (1..count).fold(0, |top, i| if height(i) > height(top) { i } else { top });
         let seen = |i: u32| (p(i).x, p(i).z);
@@ -416,31 +421,43 @@ impl Wrapping<'_> {
     }
 
     /// The facet to the left of the edge from `u` to `v`, whose ends are corners, and whether all points lie in its plane.
-    fn facet(&self, u: u32, v: u32) -> (Vec<u32>, bool) {
-        let p = |i: u32| self.at[i as usize];
+    fn facet(&mut self, u: u32, v: u32) -> (Vec<u32>, bool) {
+        let at = self.at;
+        let p = |i: u32| at[i as usize];
         let mut in_plane = vec![u, v];
         // Points on the edge's own line are no corners.
-        let count = self.at.len() as u32;
+        let count = at.len() as u32;
         let Some(first) = (0..count).find(|i| !collinear(p(u), p(v), p(*i))) else { return (in_plane, true) };
         in_plane.push(first);
         let (mut plane, mut flat, mut third) = (self.plane(u, v, first), true, first);
-        for (i, at) in (0..).zip(self.at).skip(first as usize + 1) {
-            if plane.is_clearly_below(*at) {
+        let mut filter = self.sheared.plane(u, v, first);
+        let mut close = 0;
+        for (i, (at, rest)) in (0..).zip(self.sheared.points()).skip(first as usize + 1) {
+            let mut side = filter.side(at, rest);
+            if side < 0 {
                 flat = false;
                 continue;
             }
             if i == u || i == v {
                 continue;
             }
-            match plane.side(*at) {
+            if side == 0 {
+                side = plane.side(p(i));
+                close += usize::from(side != 0);
+            }
+            match side {
                 0 => in_plane.push(i),
                 1 => {
                     (third, plane, flat) = (i, self.plane(u, v, i), false);
+                    filter = self.sheared.plane(u, v, i);
                     in_plane.truncate(2);
                     in_plane.push(i);
                 }
                 _ => flat = false,
             }
+        }
+        if close > at.len() / 16 {
+            self.sheared = Sheared::new(at, exact::normal(p(u), p(v), p(third)));
         }
         if in_plane.len() == 3 {
             return (in_plane, flat);

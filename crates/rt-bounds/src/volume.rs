@@ -28,6 +28,11 @@ pub trait BoundingVolume: Sized {
 
     /// The box around the volume.
     fn aabb(&self) -> Aabb;
+
+    /// The bytes that the volume takes, those it holds on the heap included.
+    fn bytes(&self) -> usize {
+        size_of::<Self>()
+    }
 }
 
 impl BoundingVolume for Aabb {

@@ -164,6 +164,40 @@ fn every_point_is_inside_in_f64() {
     contains::<f64>(2, 600);
 }
 
+/// Points that only the roundings keep from being in a plane, or in two: all decisions are close.
+#[test]
+fn turned_circles_and_cylinders_have_exact_hulls() {
+    let mut seeded = Seeded::new(3);
+    for count in [7, 40, 96] {
+        let (x, z) = (seeded.direction(), seeded.direction());
+        let (x, y) = (x, z.cross(x));
+        let at = |i: usize| std::f64::consts::TAU * i as f64 / count as f64;
+        let circle: Vec<DVec3> = (0..count).map(|i| x * at(i).cos() + y * at(i).sin()).collect();
+        let hull = Hull::new(&circle).unwrap();
+        check(&hull, &circle);
+        assert!(hull.facets().len() > count / 2);
+        let cylinder: Vec<DVec3> =
+            (0..count).map(|i| x * at(i).cos() + y * at(i).sin() + z * (i % 2) as f64).collect();
+        check(&Hull::new(&cylinder).unwrap(), &cylinder);
+    }
+}
+
+#[test]
+fn room_for_all_planes_means_all() {
+    let mut seeded = Seeded::new(4);
+    let points: Vec<DVec3> = (0..40).map(|_| seeded.direction()).collect();
+    let hull = Hull::new(&points).unwrap();
+    let full = hull.polytope(DVec3::ZERO);
+    assert_eq!(hull.reduced(usize::MAX, DVec3::ZERO), full);
+    assert_eq!(hull.reduced(full.plane_count(), DVec3::ZERO), full);
+    let (box_alone, fewer) =
+        (hull.reduced(0, DVec3::ZERO), hull.reduced(full.plane_count() - 1, DVec3::ZERO));
+    assert!(fewer.plane_count() < full.plane_count());
+    // Heap blocks are of four planes with four numbers each.
+    assert_eq!(box_alone.bytes(), size_of::<Polytope>());
+    assert_eq!(full.bytes(), size_of::<Polytope>() + (full.plane_count() - 6).div_ceil(4) * 64);
+}
+
 /// A ray at the points or past them.
 fn a_ray<R: Real>(seeded: &mut Seeded, points: &[DVec3]) -> Ray<R> {
     let mut pick = |n: usize| points[seeded.below(n)];
@@ -215,15 +249,30 @@ struct Tally {
     wrong: Vec<String>,
 }
 
+/// How a volume is made around points, relative to an origin.
+type Fit<B> = fn(&[DVec3], DVec3) -> B;
+
+fn around<B: Planes>(points: &[DVec3], origin: DVec3) -> B {
+    B::around(points, origin).unwrap()
+}
+
+fn all_facets(points: &[DVec3], origin: DVec3) -> Polytope {
+    Hull::new(points).unwrap().polytope(origin)
+}
+
+fn some_facets(points: &[DVec3], origin: DVec3) -> Polytope {
+    Hull::new(points).unwrap().reduced(12, origin)
+}
+
 /// Draws pairs of rays and volumes, and looks for wrong misses.
-fn pairs<B: Planes, R: Real>(seed: u64, count: usize) -> Tally {
+fn pairs<B: Planes, R: Real>(seed: u64, count: usize, fit: Fit<B>) -> Tally {
     let mut seeded = Seeded::new(seed);
     let mut tally = Tally::default();
     let mut kind = 0;
     while tally.pairs < count {
         kind += 1;
         let (points, origin) = points::<R>(&mut seeded, kind % KINDS);
-        let volume = B::around(&points, origin).unwrap();
+        let volume = fit(&points, origin);
         let planes = volume.planes(origin);
         let world = volume.aabb();
         for _ in 0..50 {
@@ -268,9 +317,9 @@ fn pairs<B: Planes, R: Real>(seed: u64, count: usize) -> Tally {
     tally
 }
 
-fn none_wrong<B: Planes>(seed: u64, count: usize, what: &str) -> String {
+fn none_wrong<B: Planes>(seed: u64, count: usize, what: &str, fit: Fit<B>) -> String {
     let start = std::time::Instant::now();
-    let (single, double) = (pairs::<B, f32>(seed, count / 2), pairs::<B, f64>(seed + 1, count / 2));
+    let (single, double) = (pairs::<B, f32>(seed, count / 2, fit), pairs::<B, f64>(seed + 1, count / 2, fit));
     let mut report = format!("{what}: {:.1} s", start.elapsed().as_secs_f64());
     for tally in [single, double] {
         let shown = tally.wrong.iter().take(3).cloned().collect::<Vec<_>>().join("\n");
@@ -284,11 +333,13 @@ fn none_wrong<B: Planes>(seed: u64, count: usize, what: &str) -> String {
 
 #[test]
 fn no_wrong_miss() {
-    none_wrong::<Kdop<6>>(10, 20_000, "6-DOP");
-    none_wrong::<Kdop<14>>(11, 20_000, "14-DOP");
-    none_wrong::<Kdop<18>>(12, 20_000, "18-DOP");
-    none_wrong::<Kdop<26>>(13, 20_000, "26-DOP");
-    none_wrong::<Polytope>(14, 20_000, "polytope");
+    none_wrong::<Kdop<6>>(10, 20_000, "6-DOP", around);
+    none_wrong::<Kdop<14>>(11, 20_000, "14-DOP", around);
+    none_wrong::<Kdop<18>>(12, 20_000, "18-DOP", around);
+    none_wrong::<Kdop<26>>(13, 20_000, "26-DOP", around);
+    none_wrong::<Polytope>(14, 20_000, "polytope", around);
+    none_wrong(15, 20_000, "polytope of all facets", all_facets);
+    none_wrong(16, 20_000, "polytope of 12 planes", some_facets);
 }
 
 /// Minutes. Prints how many pairs were tried, and the share of hits that no exact ray makes.
@@ -296,11 +347,13 @@ fn no_wrong_miss() {
 #[ignore]
 #[allow(clippy::print_stdout)]
 fn no_wrong_miss_in_ten_million() {
-    println!("{}", none_wrong::<Kdop<6>>(20, 10_000_000, "6-DOP"));
-    println!("{}", none_wrong::<Kdop<14>>(21, 10_000_000, "14-DOP"));
-    println!("{}", none_wrong::<Kdop<18>>(22, 10_000_000, "18-DOP"));
-    println!("{}", none_wrong::<Kdop<26>>(23, 10_000_000, "26-DOP"));
-    println!("{}", none_wrong::<Polytope>(24, 10_000_000, "polytope"));
+    println!("{}", none_wrong::<Kdop<6>>(20, 10_000_000, "6-DOP", around));
+    println!("{}", none_wrong::<Kdop<14>>(21, 10_000_000, "14-DOP", around));
+    println!("{}", none_wrong::<Kdop<18>>(22, 10_000_000, "18-DOP", around));
+    println!("{}", none_wrong::<Kdop<26>>(23, 10_000_000, "26-DOP", around));
+    println!("{}", none_wrong::<Polytope>(24, 10_000_000, "polytope", around));
+    println!("{}", none_wrong(25, 10_000_000, "polytope of all facets", all_facets));
+    println!("{}", none_wrong(26, 10_000_000, "polytope of 12 planes", some_facets));
 }
 
 #[test]
