@@ -121,8 +121,8 @@ pub(super) trait Form: Sized {
 
 /// A point of the line, from the anchor: `o + t d`, with its size in the bounds of rounding.
 #[inline(always)]
-pub(super) fn offset<T: Number>(anchor: DVec3, o: DVec3, d: DVec3, t: f64) -> [T; 3] {
-    [0, 1, 2].map(|i| T::difference(o[i], anchor[i]) + T::from(t) * d[i].into())
+pub(super) fn offset<T: Number>(anchor: DVec3, o: DVec3, d: DVec3, t: T) -> [T; 3] {
+    [0, 1, 2].map(|i| T::difference(o[i], anchor[i]) + t * d[i].into())
 }
 
 /// Bound on the error of a coordinate of [`offset`].
@@ -166,7 +166,7 @@ impl<T: Number> Coefficients<T> {
     pub(super) fn new<F: Form>(form: &F, o: DVec3, d: DVec3, t: f64) -> Coefficients<T> {
         let extent = form.extent();
         let (signs, slope) = (form.signs(), T::wide(form.slope()));
-        let w = offset::<T>(extent.anchor, o, d, t);
+        let w = offset(extent.anchor, o, d, T::from(t));
         let (u, v) = (form.at(w), form.linear::<T>(d.to_array().map(T::from)));
         let half = T::from(0.5) * slope;
         let (eta, nu) = uncertain::<T, F>(form, &w, o, d, t);

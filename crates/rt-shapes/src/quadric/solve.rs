@@ -12,6 +12,8 @@ use rt_geom::{Ray, Real, Vector};
 const U: f64 = f64::EPSILON / 2.0;
 /// A discriminant this much larger than its error gives roots that Newton's steps converge from: to all digits in three.
 const CLEAR: f64 = 4096.0;
+/// The relative error of a root that decides: what twice the digits give, nearly.
+const GOAL: f64 = f64::from_bits((1023 - 95) << 52); // 2^-95
 
 /// Whether products of four such factors stay in range; false for NaN.
 #[inline(always)]
@@ -19,12 +21,18 @@ fn moderate(x: f64) -> bool {
     x > 1e-60 && x < 1e60
 }
 
-/// A root as first found, off by no more than `slack`; `fine` if more digits would not help.
+/// A root off by no more than `error`, as first found in `f64` or with twice the digits.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
-    t: f64,
-    slack: f64,
-    fine: bool,
+    t: DoubleDouble,
+    error: f64,
+    digits: Digits,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Digits {
+    Single,
+    Double,
 }
 
 /// Each hit of the ray on the surface, nearest first.
@@ -133,16 +141,16 @@ fn candidates<F: Form>(form: &F, o: DVec3, d: DVec3) -> Option<[Option<Candidate
     let away = q.abs() > span * (a.abs() + off[0]);
     if discriminant > CLEAR * doubt && (away || a.abs() > CLEAR * off[0]) {
         let candidate = |s: f64| Candidate {
-            t: t + s,
-            slack: (off[2] + 2.0 * s.abs() * off[1] + s * s * off[0]) / root + 2.0 * U * (t.abs() + s.abs()),
-            fine: false,
+            t: (t + s).into(),
+            error: (off[2] + 2.0 * s.abs() * off[1] + s * s * off[0]) / root + 2.0 * U * (t.abs() + s.abs()),
+            digits: Digits::Single,
         };
         let first = candidate(c / q);
         if away {
             return Some([Some(first), None]);
         }
         let second = candidate(q / a);
-        let both = if first.t <= second.t { [first, second] } else { [second, first] };
+        let both = if first.t.value() <= second.t.value() { [first, second] } else { [second, first] };
         return Some(both.map(Some));
     }
     candidates_wide(form, o, d, t, span)
@@ -199,14 +207,15 @@ fn candidates_wide<F: Form>(
     // By how much the root of the discriminant may be off.
     let blur = if root.value() > 0.0 { (doubt / root.value()).min(doubt.sqrt()) } else { doubt.sqrt() };
     let candidate = |s: DoubleDouble| {
-        let (at, s) = ((DoubleDouble::from(t) + s).value(), s.value());
+        let (at, s) = (DoubleDouble::from(t) + s, s.value());
         let by_slope = (off[2] + 2.0 * s.abs() * off[1] + s * s * off[0]) / root.value();
         let by_half = (blur + off[1] + s.abs() * off[0]) / a.abs();
         // Either may be NaN, where the other is not.
         let own = if root.value() * root.value() > 4.0 * doubt { by_slope.min(by_half) } else { by_half };
-        Candidate { t: at, slack: 2.0 * own + U * at.abs(), fine: true }
+        let rounded = DoubleDouble::U * (t.abs() + s.abs());
+        Candidate { t: at, error: 2.0 * own + 4.0 * rounded, digits: Digits::Double }
     };
-    let near = |c: &Candidate| (c.t - t).abs() <= 2.0 * span + c.slack;
+    let near = |c: &Candidate| (c.t.value() - t).abs() <= 2.0 * span + c.error;
     if root.value() == 0.0 && a.abs() > off[0] {
         return Some([Some(candidate(q / k.a)), None]);
     }
@@ -217,7 +226,7 @@ fn candidates_wide<F: Form>(
     let second = if a.abs() > off[0] { Some(candidate(q / k.a)).filter(near) } else { None };
     let first = Some(candidate(k.c / q)).filter(near);
     Some(match (first, second) {
-        (Some(x), Some(y)) if y.t < x.t => [Some(y), Some(x)],
+        (Some(x), Some(y)) if (y.t - x.t).value() < 0.0 => [Some(y), Some(x)],
         (None, y) => [y, None],
         both => [both.0, both.1],
     })
@@ -226,16 +235,16 @@ fn candidates_wide<F: Form>(
 /// Newton's steps on `f` evaluated with twice the digits, until they no longer matter.
 ///
 /// On a quadratic, `e` away from a root, a step `f / f'` leaves `a e^2 / f'`; and `e` is at most two steps while
-/// `4 |a f| <= f'^2`. So each step tells what error it leaves.
+/// `4 |a f| <= f'^2`. So each step tells what error it leaves; they end when that is below `goal` times the root.
 #[inline(never)]
-fn polish<F: Form>(form: &F, o: DVec3, d: DVec3, mut t: f64) -> Option<Root> {
+fn polish<F: Form>(form: &F, o: DVec3, d: DVec3, mut t: f64, goal: f64) -> Option<Candidate> {
     let anchor = form.extent().anchor;
     let (signs, slope) = (form.signs(), form.slope());
     let v = form.linear::<DoubleDouble>(d.to_array().map(DoubleDouble::from));
     let fast = v.squares.map(DoubleDouble::value);
     let a = signed(signs, &fast, &fast);
     for round in 0..6 {
-        let w = offset::<DoubleDouble>(anchor, o, d, t);
+        let w = offset(anchor, o, d, DoubleDouble::from(t));
         let u = form.at(w);
         let f = (signed(signs, &u.squares, &u.squares) - slope * u.axial).value();
         let derivative =
@@ -248,12 +257,13 @@ fn polish<F: Form>(form: &F, o: DVec3, d: DVec3, mut t: f64) -> Option<Root> {
         if !(4.0 * (a * f).abs() <= derivative * derivative && derivative.abs() > 2.0 * tilt) {
             return None;
         }
-        let next = (DoubleDouble::from(t) - step.into()).value();
+        let next = DoubleDouble::from(t) - step.into();
         let floor = 2.0 * off / derivative.abs();
         let left = (4.0 * a.abs() * step * step + 2.0 * tilt * step.abs()) / derivative.abs() + floor;
-        t = next;
-        if left <= 0.125 * U * t.abs() || (left <= 2.0 * floor && round > 0) || round == 5 {
-            return Some(Root { t, error: 2.0 * left + U * t.abs() });
+        t = next.value();
+        if left <= goal * t.abs() || (left <= 2.0 * floor && round > 0) || round == 5 {
+            let rounded = 4.0 * DoubleDouble::U * t.abs();
+            return Some(Candidate { t: next, error: 2.0 * left + rounded, digits: Digits::Double });
         }
     }
     None
@@ -278,19 +288,24 @@ struct Window {
 }
 
 impl Window {
-    /// Whether `value`, known up to `off` and linear along the line, may be at least 0 at the root.
+    /// Whether `value + slope s + bend s^2`, known up to `off`, may be at least 0 for an `s` within the error of the root.
     #[inline(always)]
-    fn admits(&mut self, value: f64, off: f64, slope: f64) -> bool {
-        let play = slope.abs() * self.error + off;
-        if value >= play {
+    fn admits(&mut self, value: f64, off: f64, slope: f64, bend: f64) -> bool {
+        let error = self.error;
+        // The most that is added within the error if it bends by `b`: at an end, or where it turns.
+        let most = |b: f64| match slope.abs() < -2.0 * b * error {
+            true => slope * slope / (-4.0 * b),
+            false => (slope.abs() + b * error) * error,
+        };
+        if value >= off + most(-bend) {
             return true;
         }
-        if value < -play {
+        if value < -off - most(bend) {
             return false;
         }
         self.unsure = true;
         // Where it is 0, as generous as its bound.
-        let zero = -(value + off) / slope;
+        let zero = -(value + off + bend.max(0.0) * error * error) / slope;
         if slope > 0.0 {
             self.from = self.from.max(zero);
         } else if slope < 0.0 {
@@ -303,37 +318,35 @@ impl Window {
 
 /// Decides about the root at `t`, off by no more than `error`, by signs.
 #[inline(always)]
-fn verdict<F: Form, T: Number>(form: &F, o: DVec3, d: DVec3, t: f64, error: f64) -> Verdict {
+fn verdict<F: Form, T: Number>(form: &F, o: DVec3, d: DVec3, t: T, error: f64) -> Verdict {
     let extent = form.extent();
-    let w = offset::<T>(extent.anchor, o, d, t);
+    let w = offset(extent.anchor, o, d, t);
     let (u, v) = (form.linear(w), form.linear::<T>(d.to_array().map(T::from)));
-    let (eta, _) = uncertain::<T, F>(form, &w, o, d, t);
+    let (eta, _) = uncertain::<T, F>(form, &w, o, d, t.value());
     let mut window = Window { from: -error, to: error, error, unsure: false };
     let limits = extent.limits.map(T::wide);
     let rounded = |x: T| eta + 4.0 * T::U * x.value().abs();
     let axial = v.axial.value();
-    if !window.admits((u.axial - limits[0]).value(), rounded(limits[0]), axial)
-        || !window.admits((limits[1] - u.axial).value(), rounded(limits[1]), -axial)
+    if !window.admits((u.axial - limits[0]).value(), rounded(limits[0]), axial, 0.0)
+        || !window.admits((limits[1] - u.axial).value(), rounded(limits[1]), -axial, 0.0)
     {
         return Verdict::Outside;
     }
     if let Some(sweep) = form.sweep() {
-        // The point beside the direction that angles count from, how it moves, and what its sides are off by: on a twisted surface
-        // they bend along the line.
-        let (p, moves, off) = if form.twisted() {
+        // The point beside the direction that angles count from, how it moves and bends along the line, and what it is off by.
+        let zero = [T::from(0.0); 2];
+        let (p, moves, bends, off) = if form.twisted() {
             let (a, b) = (form.at(w).squares, v.squares);
             let relative = |g: &[T; 4], p: &[T; 4]| [g[2] * p[0] + g[3] * p[1], g[2] * p[1] - g[3] * p[0]];
             let ([x0, y0], [x1, y1]) = (relative(&a, &b), relative(&b, &a));
-            let bent = relative(&b, &b).map(|x| x.value().abs() * error * error);
             let total: f64 = a.iter().map(|x| x.value().abs()).sum();
-            let off = 4.0 * eta * (total + 2.0 * eta) + bent[0] + bent[1];
-            (relative(&a, &a), [x0 + x1, y0 + y1], off)
+            (relative(&a, &a), [x0 + x1, y0 + y1], relative(&b, &b), 4.0 * eta * (total + 2.0 * eta))
         } else {
-            ([u.squares[0], u.squares[1]], [v.squares[0], v.squares[1]], 4.0 * eta)
+            ([u.squares[0], u.squares[1]], [v.squares[0], v.squares[1]], zero, 4.0 * eta)
         };
         let cross = |e: DVec2, p: [T; 2]| (T::from(e.x) * p[1] - T::from(e.y) * p[0]).value();
         let side = |window: &mut Window, e: DVec2, sign: f64| {
-            window.admits(sign * cross(e, p), off, sign * cross(e, moves))
+            window.admits(sign * cross(e, p), off, sign * cross(e, moves), sign * cross(e, bends))
         };
         let [from, to] = sweep.ends;
         if sweep.reflex {
@@ -367,7 +380,9 @@ fn settle<F: Form, R: Real>(
     t_min: f64,
     t_max: f64,
 ) -> Option<Root> {
-    let Candidate { t, slack, fine } = candidate;
+    let Candidate { digits, .. } = candidate;
+    let t = candidate.t.value();
+    let slack = candidate.error + U * t.abs();
     if !(t + slack >= t_min && t - slack <= t_max) {
         return None;
     }
@@ -377,47 +392,49 @@ fn settle<F: Form, R: Real>(
     }
     if rough == Verdict::Inside && slack <= R::ROOT_ERROR * t.abs() {
         // Only the near end of the interval may need more digits, and then for the decision only.
-        if (t - t_min).abs() > slack || fine {
-            return Some(Root { t: near_end(t, slack, t_min), error: slack });
+        if (t - t_min).abs() > slack {
+            return Some(Root { t, error: slack });
         }
-        let root = polish(form, o, d, t).unwrap_or(Root { t, error: slack });
-        return (near_end(root.t, root.error, t_min) >= t_min)
-            .then(|| Root { t: t.max(t_min), error: slack });
+        let fine = polish(form, o, d, t, GOAL).unwrap_or(candidate);
+        return (near_end(&fine, t_min) >= t_min).then(|| Root { t: t.max(t_min), error: slack });
     }
-    let mut root = match polish(form, o, d, t) {
-        Some(root) if !fine || root.error < slack => root,
-        _ if fine => Root { t, error: slack },
-        _ => closest_wide(form, o, d, t, slack),
+    // A decision left open wants all digits, not only those of the answer.
+    let goal = if rough == Verdict::Inside { 0.125 * U } else { GOAL };
+    let mut fine = match polish(form, o, d, t, goal) {
+        Some(fine) if digits == Digits::Single || fine.error < candidate.error => fine,
+        _ if digits == Digits::Double => candidate,
+        _ => closest_wide(form, o, d, candidate),
     };
     // From a point of the surface, as far as can be told, the distance is none.
-    if root.t.abs() <= root.error {
-        root.t = 0.0;
-        root.error *= 2.0;
+    if fine.t.value().abs() <= fine.error {
+        fine = Candidate { t: 0.0.into(), error: 2.0 * fine.error, ..fine };
     }
-    if rough != Verdict::Inside || root.error > slack {
-        match verdict::<F, DoubleDouble>(form, o, d, root.t, root.error) {
+    if rough != Verdict::Inside || fine.error > slack {
+        match verdict::<F, DoubleDouble>(form, o, d, fine.t, fine.error) {
             Verdict::Inside => {}
             Verdict::Outside => return None,
             Verdict::Unsure(shift) => {
-                root.t += shift;
-                root.error += shift.abs() + U * root.t.abs();
+                fine.t = fine.t + shift.into();
+                fine.error += shift.abs();
             }
         }
     }
-    Some(Root { t: near_end(root.t, root.error, t_min), ..root })
+    let t = near_end(&fine, t_min);
+    Some(Root { t, error: fine.error + U * t.abs() })
 }
 
-/// A root that may lie at the near end of the interval does.
+/// The root, rounded; at the near end of the interval, if it may lie there.
 #[inline(always)]
-fn near_end(t: f64, error: f64, t_min: f64) -> f64 {
-    if t < t_min && t + error >= t_min { t_min } else { t }
+fn near_end(root: &Candidate, t_min: f64) -> f64 {
+    let t = root.t.value();
+    if t < t_min && t + root.error >= t_min { t_min } else { t }
 }
 
-/// The root from twice the digits that is nearest to `t`, where steps do not converge.
+/// The root from twice the digits that is nearest to one from fewer, where steps do not converge.
 #[cold]
-fn closest_wide<F: Form>(form: &F, o: DVec3, d: DVec3, t: f64, slack: f64) -> Root {
-    let span = 2.0 * form.extent().radius / d.length();
+fn closest_wide<F: Form>(form: &F, o: DVec3, d: DVec3, rough: Candidate) -> Candidate {
+    let (t, span) = (rough.t.value(), 2.0 * form.extent().radius / d.length());
     let found = candidates_wide(form, o, d, t, span).unwrap_or_default().into_iter().flatten();
-    let nearest = found.min_by(|x, y| (x.t - t).abs().total_cmp(&(y.t - t).abs()));
-    nearest.map_or(Root { t, error: slack }, |c| Root { t: c.t, error: c.slack })
+    let off = |c: &Candidate| (c.t.value() - t).abs();
+    found.min_by(|x, y| off(x).total_cmp(&off(y))).unwrap_or(rough)
 }

@@ -10,14 +10,15 @@ const U: f64 = f64::EPSILON / 2.0;
 
 /// The point of the ray at `t`, from the anchor of the form.
 pub(super) fn offset<F: Form, R: Real>(form: &F, ray: &Ray<R>, t: R) -> DVec3 {
-    let w = from_anchor::<DoubleDouble>(form.extent().anchor, ray.origin.widen(), ray.dir.widen(), t.into());
+    let w =
+        from_anchor(form.extent().anchor, ray.origin.widen(), ray.dir.widen(), DoubleDouble::from(t.into()));
     DVec3::from_array(w.map(Number::value))
 }
 
 /// The value of the form at a point of the world, its error, and its gradient.
 fn value<F: Form>(form: &F, point: DVec3) -> (f64, f64, DVec3, f64) {
     let extent = form.extent();
-    let w = from_anchor::<DoubleDouble>(extent.anchor, point, DVec3::ZERO, 0.0);
+    let w = from_anchor(extent.anchor, point, DVec3::ZERO, DoubleDouble::from(0.0));
     let (u, slope) = (form.at(w), form.slope());
     let signs = form.signs();
     let f = signed(signs, &u.squares, &u.squares) - slope * u.axial;

@@ -143,13 +143,12 @@ impl Part {
     pub(crate) fn truth(&self, o: DVec3, d: DVec3) -> Vec<Rational> {
         let (weight, q) = self.profile();
         let mut roots = exact::revolved(o.to_array(), d.to_array(), &weight, &q);
-        roots.retain(|t| self.limits(o, d, t, 0.0) == [true; 3]);
+        roots.retain(|t| self.limits(o, d, t) == [true; 3]);
         roots
     }
 
-    /// Whether the point at `t` is above the lower limit, below the upper one and within the sweep, or beside that by `play` times its
-    /// distance from the axis.
-    fn limits(&self, o: DVec3, d: DVec3, t: &Rational, play: f64) -> [bool; 3] {
+    /// Whether the point at `t` is above the lower limit, below the upper one and within the sweep.
+    fn limits(&self, o: DVec3, d: DVec3, t: &Rational) -> [bool; 3] {
         let [x, y, z] = [0, 1, 2].map(|i| &whole(o[i]) + &(t * &whole(d[i])));
         let (low, high) = (&z - &whole(self.z[0]), &whole(self.z[1]) - &z);
         let swept = self.sweep.is_none_or(|[from, to]| {
@@ -160,9 +159,8 @@ impl Part {
                 }
                 _ => (x, y),
             };
-            let play = whole(if play > 0.0 { play * (x.to_f64().abs() + y.to_f64().abs()) } else { 0.0 });
-            let side = |phi: f64| &(&whole(phi.cos()) * &y) - &(&whole(phi.sin()) * &x);
-            let (after, before) = ((&side(from) + &play).sign() >= 0, (&side(to) - &play).sign() <= 0);
+            let side = |phi: f64| (&(&whole(phi.cos()) * &y) - &(&whole(phi.sin()) * &x)).sign();
+            let (after, before) = (side(from) >= 0, side(to) <= 0);
             if to - from > std::f64::consts::PI { after || before } else { after && before }
         });
         [low.sign() >= 0, high.sign() >= 0, swept]
@@ -170,13 +168,12 @@ impl Part {
 
     /// Whether `f64` times two cannot be blamed for taking this for a root: within its error there is one of the whole
     /// surface, or the line comes so close that the residual is below `1e-27`, nearly `2^-90`, but for `t` being rounded; and
-    /// each limit holds somewhere within twice the error, that of the sweep up to `1e-15`: along a ruling at its end
-    /// the solver allows for the square of the error.
+    /// each limit holds somewhere within the error.
     fn near(&self, o: DVec3, d: DVec3, root: Root) -> bool {
-        let error = whole(root.error * 2.0);
+        let error = whole(root.error * 1.01);
         let spots = [&whole(root.t) - &error, whole(root.t), &whole(root.t) + &error];
         let kept = spots.iter().fold([false; 3], |kept, t| {
-            let now = self.limits(o, d, t, 1e-15);
+            let now = self.limits(o, d, t);
             [0, 1, 2].map(|i| kept[i] || now[i])
         });
         let (weight, q) = self.profile();
