@@ -401,7 +401,10 @@ fn table(measured: &[Measured]) -> String {
             rate(error.wrong_per_million()),
             rate(error.missed_per_million()),
             rate(error.invented_per_million()),
-            optional(m.has_t.then_some(error.t_ulp), 2),
+            match m.has_t.then_some(error.t_ulp) {
+                Some(ulps) if ulps > 1e5 => format!("{ulps:.1e}"),
+                ulps => optional(ulps, 2),
+            },
             optional(m.off.filter(|(kind, _)| *kind == ErrorKind::Void).map(|(_, off)| off), 3),
             m.off
                 .filter(|(kind, _)| *kind == ErrorKind::Distance)
