@@ -190,12 +190,7 @@ impl<V: Real> TriangleMesh<V> {
 
     /// The weights of the corners at a hit, in full precision.
     fn weights<R: Real>(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> [f64; 3] {
-        let line = Ray { t_min: -R::INFINITY, t_max: R::INFINITY, ..*ray };
-        let (u, v) = match self.triangle(hit.at.prim).intersect(&line) {
-            Some(meeting) => (meeting.u, meeting.v),
-            None => (hit.at.u as f64, hit.at.v as f64),
-        };
-        [1.0 - u - v, u, v]
+        self.triangle(hit.at.prim).weights(ray, hit)
     }
 }
 
@@ -317,16 +312,60 @@ impl Triangle {
         let [a, b, c] = self.corners;
         let point = a * w0 + b * w1 + c * w2;
         let error = (a.abs() * w0.abs() + b.abs() * w1.abs() + c.abs() * w2.abs()) * gamma(7);
-        let normal = (b - a).cross(c - a);
+        // Edges of size 1, so that products neither vanish nor overflow.
+        let size = |v: DVec3| v / v.abs().max_element();
+        let normal = size(b - a).cross(size(c - a));
         // Scaled first where the square of a component would leave the range.
         let normal = (normal / normal.abs().max_element()).normalize_or_zero();
         Surface { point, error, normal, shading: normal, uv: DVec2::new(w1, w2) }
+    }
+
+    /// The weights of the corners where a ray hit: of the exact distance, rounded once, then of the point there. The volumes that
+    /// decide a hit are off by the square of the distance; this is off by some roundings of the distance.
+    pub(crate) fn weights<R: Real>(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> [f64; 3] {
+        let line = Ray { t_min: f64::NEG_INFINITY, t_max: f64::INFINITY, ..ray.widen() };
+        let told = |u: f64, v: f64| [1.0 - u - v, u, v];
+        match self.intersect(&line) {
+            Some(meeting) => self.weights_at(line.at(meeting.t)).unwrap_or(told(meeting.u, meeting.v)),
+            None => told(hit.at.u as f64, hit.at.v as f64),
+        }
+    }
+
+    /// The weights of the point nearest `p`, or of one of the border; `None` where products leave the range of `f64`.
+    fn weights_at(&self, p: DVec3) -> Option<[f64; 3]> {
+        let [a, b, c] = self.corners;
+        let normal = (b - a).cross(c - a);
+        let square = normal.length_squared();
+        let share = |v: DVec3| (v.dot(normal) / square).clamp(0.0, 1.0);
+        let (u, v) = (share((p - a).cross(c - a)), share((b - a).cross(p - a)));
+        let sum = (u + v).max(1.0);
+        (square.is_normal() && u.is_finite() && v.is_finite())
+            .then(|| [(1.0 - u - v).max(0.0), u / sum, v / sum])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_point_stays_at_the_hit_from_far_away() {
+        let triangle =
+            Triangle { corners: [DVec3::ZERO, DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.2, 1.0, 0.3)] };
+        for distance in [1.0, 1e3, 1e5, 1e7] {
+            let target = DVec3::new(0.375, 0.34375, 0.08);
+            let dir = DVec3::new(0.3, -0.2, 0.93);
+            let ray = Ray::new(target - dir * distance, dir);
+            let meeting = triangle.intersect(&ray).unwrap();
+            let point = triangle.surface(triangle.weights(&ray, &hit(0, meeting))).point;
+            let off = (point - ray.at(meeting.t)).length();
+            assert!(off < 4.0 * f64::EPSILON * (distance + 1.0), "{off} from {distance}");
+        }
+        for size in [1e-200, 1e200] {
+            let small = Triangle { corners: triangle.corners.map(|c| c * size) };
+            assert!((small.surface([0.5, 0.25, 0.25]).normal.length() - 1.0).abs() < 1e-12);
+        }
+    }
 
     #[test]
     fn bad_indices_are_named() {

@@ -180,9 +180,9 @@ impl<R: Real> Primitive<R> for Polygon {
 }
 
 impl<R: Real> Shape<R> for Polygon {
-    fn surface(&self, _ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
-        let (u, v) = (hit.at.u as f64, hit.at.v as f64);
-        let surface = self.triangles[hit.at.prim as usize].surface([1.0 - u - v, u, v]);
+    fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
+        let part = &self.triangles[hit.at.prim as usize];
+        let surface = part.surface(part.weights(ray, hit));
         // The part's own normal, on the polygon's side: corners may be off the plane.
         let side = if surface.normal.dot(self.normal) < 0.0 { -surface.normal } else { surface.normal };
         Surface { normal: side, shading: side, ..surface }

@@ -256,7 +256,8 @@ impl<R: Real> Shape<R> for Sphere {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
         let wide = ray.widen();
         let rough = wide.at(hit.t.into()) - self.center;
-        let normal = rough.normalize_or(DVec3::Z);
+        // Of size 1 first, so that squares neither vanish nor overflow.
+        let normal = (rough / rough.abs().max_element()).normalize_or(DVec3::Z);
         let offset = normal * self.radius;
         let point = self.center + offset;
         let error = (offset.abs() * 2.0 + point.abs()) * gamma(5);

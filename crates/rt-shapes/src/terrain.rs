@@ -219,15 +219,6 @@ impl<H: Heights> Terrain<H> {
     fn triangle(&self, node: &Node) -> Triangle {
         Triangle { corners: core::array::from_fn(|k| self.place(node.at[k]).extend(node.z[k])) }
     }
-
-    fn weights<R: Real>(&self, ray: &Ray<R>, hit: &Hit<Uv, R>, facet: &Triangle) -> [f64; 3] {
-        let line = Ray { t_min: -R::INFINITY, t_max: R::INFINITY, ..*ray };
-        let (u, v) = match facet.intersect(&line) {
-            Some(meeting) => (meeting.u, meeting.v),
-            None => (hit.at.u.into(), hit.at.v.into()),
-        };
-        [1.0 - u - v, u, v]
-    }
 }
 
 /// The number of nodes above a level.
@@ -300,7 +291,7 @@ impl<R: Real, H: Heights> Shape<R> for Terrain<H> {
                 uv: DVec2::ZERO,
             };
         };
-        let mut surface = facet.surface(self.weights(ray, hit, &facet));
+        let mut surface = facet.surface(facet.weights(ray, hit));
         surface.uv = (surface.point.truncate() - self.params.min) / self.params.size;
         surface
     }
