@@ -25,13 +25,14 @@ use rt_geom::{Ray, Real};
 /// The equation is a signed sum of squares of linear functions. Its coefficients are taken about the point of the line
 /// nearest to the middle of the surface, so that nothing cancels for a small far or a huge near one, first in `f64` with a
 /// bound on their error. What the bound leaves open (tangents, lines along a ruling, a vanishing leading coefficient) is
-/// computed again with twice the digits. What even these leave open, some `2^-90` of the size, is a hit: none is missed.
+/// computed again with twice the digits. What even these leave open, some `2^-90` of size and distance, is a hit: none is
+/// missed.
 ///
-/// Roots that need it are polished by Newton's steps on the equation with twice the digits. They are within two units in
+/// Roots that need it are polished by Newton's steps on the equation with twice the digits. They are within one unit in
 /// the last place of the exact ones while the condition is below `10^6`, and always within the error that
 /// [`Quadric::roots`] reports. Limits of height and angle are decided by signs at the root, never by an arc tangent; a root
-/// that may lie on a border does, and `t` is then moved to the border within its error; a distance that may be 0 is. A line
-/// that lies in the surface does not meet it.
+/// that may lie on a border by twice the digits does; a distance that may be 0 is. A line that lies in the surface does not
+/// meet it.
 ///
 /// The ends of a sweep are the directions that `cos` and `sin` of the angles round to. Sizes, distances and components of
 /// directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e290`;

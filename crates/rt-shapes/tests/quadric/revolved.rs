@@ -143,37 +143,42 @@ impl Part {
     pub(crate) fn truth(&self, o: DVec3, d: DVec3) -> Vec<Rational> {
         let (weight, q) = self.profile();
         let mut roots = exact::revolved(o.to_array(), d.to_array(), &weight, &q);
-        roots.retain(|t| self.limits(o, d, t) == [true; 3]);
+        roots.retain(|t| self.limits(o, d, t, 0.0) == [true; 3]);
         roots
     }
 
-    /// Whether the point at `t` is above the lower limit, below the upper one and within the sweep.
-    fn limits(&self, o: DVec3, d: DVec3, t: &Rational) -> [bool; 3] {
+    /// Whether the point at `t` is above the lower limit, below the upper one and within the sweep, or no further than `play`.
+    fn limits(&self, o: DVec3, d: DVec3, t: &Rational, play: f64) -> [bool; 3] {
         let [x, y, z] = [0, 1, 2].map(|i| &whole(o[i]) + &(t * &whole(d[i])));
         let (low, high) = (&z - &whole(self.z[0]), &whole(self.z[1]) - &z);
         let swept = self.sweep.is_none_or(|[from, to]| {
-            let (x, y) = match self.plan {
+            let (gx, gy) = match self.plan {
                 Plan::Hyperboloid(..) => {
                     let [gx, gy] = self.generator().map(|(b, m)| &b + &(&m * &z));
-                    (&(&gx * &x) + &(&gy * &y), &(&gx * &y) - &(&gy * &x))
+                    (gx, gy)
                 }
-                _ => (x, y),
+                _ => (whole(1.0), whole(0.0)),
             };
-            let side = |phi: f64| (&(&whole(phi.cos()) * &y) - &(&whole(phi.sin()) * &x)).sign();
-            let (after, before) = (side(from) >= 0, side(to) <= 0);
+            // The point beside the generator, whose length multiplies distances.
+            let (along, beside) = (&(&gx * &x) + &(&gy * &y), &(&gx * &y) - &(&gy * &x));
+            let play = whole(play * (gx.to_f64().abs() + gy.to_f64().abs()));
+            let side = |phi: f64| &(&whole(phi.cos()) * &beside) - &(&whole(phi.sin()) * &along);
+            let (after, before) = ((&side(from) + &play).sign() >= 0, (&side(to) - &play).sign() <= 0);
             if to - from > std::f64::consts::PI { after || before } else { after && before }
         });
-        [low.sign() >= 0, high.sign() >= 0, swept]
+        let play = whole(play);
+        [(&low + &play).sign() >= 0, (&high + &play).sign() >= 0, swept]
     }
 
-    /// Whether `f64` times two cannot be blamed for taking this for a root: within its error there is one of the whole
-    /// surface, or the line comes so close that the residual is below `1e-27`, nearly `2^-90`, but for `t` being rounded; and
-    /// each limit holds somewhere within the error.
+    /// Whether twice the digits of `f64` cannot be blamed for taking this for a root, by what [`Quadric`] promises: within its
+    /// error there is one of the whole surface, or the line comes so close that the residual is below `2^-90` (but for `t`
+    /// being rounded); and each limit holds somewhere within the error, or up to `2^-90` of the distance.
     fn near(&self, o: DVec3, d: DVec3, root: Root) -> bool {
         let error = whole(root.error * 1.01);
         let spots = [&whole(root.t) - &error, whole(root.t), &whole(root.t) + &error];
+        let doubt = (o.length() + (d * root.t).length()) * 2f64.powi(-90);
         let kept = spots.iter().fold([false; 3], |kept, t| {
-            let now = self.limits(o, d, t);
+            let now = self.limits(o, d, t, doubt);
             [0, 1, 2].map(|i| kept[i] || now[i])
         });
         let (weight, q) = self.profile();
@@ -192,7 +197,7 @@ impl Part {
         let tip = square.to_f64().sqrt() <= 4.0 * root.error * d.length();
         let kept = kept[0] && kept[1] && (kept[2] || tip);
         let step = d.length() * root.error;
-        kept && (on || value <= 1e-27 * size * (1.0 + far) + step * step)
+        kept && (on || value <= 2f64.powi(-90) * size * (1.0 + far) + step * step)
     }
 }
 
