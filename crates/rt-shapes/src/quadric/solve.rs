@@ -33,6 +33,8 @@ struct Candidate {
 enum Digits {
     Single,
     Double,
+    /// Twice the digits, and still one or two roots: steps would lead to one of two.
+    Touching,
 }
 
 /// Each hit of the ray on the surface, nearest first.
@@ -217,7 +219,7 @@ fn candidates_wide<F: Form>(
     };
     let near = |c: &Candidate| (c.t.value() - t).abs() <= 2.0 * span + c.error;
     if root.value() == 0.0 && a.abs() > off[0] {
-        return Some([Some(candidate(q / k.a)), None]);
+        return Some([Some(Candidate { digits: Digits::Touching, ..candidate(q / k.a) }), None]);
     }
     if q.value() == 0.0 {
         // All of the line lies in the surface, which it then does not cross.
@@ -395,15 +397,17 @@ fn settle<F: Form, R: Real>(
         if (t - t_min).abs() > slack {
             return Some(Root { t, error: slack });
         }
-        let fine = polish(form, o, d, t, GOAL).unwrap_or(candidate);
+        let polished = if digits == Digits::Touching { None } else { polish(form, o, d, t, GOAL) };
+        let fine = polished.unwrap_or(candidate);
         return (near_end(&fine, t_min) >= t_min).then(|| Root { t: t.max(t_min), error: slack });
     }
     // A decision left open wants all digits, not only those of the answer.
     let goal = if rough == Verdict::Inside { 0.125 * U } else { GOAL };
-    let mut fine = match polish(form, o, d, t, goal) {
+    let polished = if digits == Digits::Touching { None } else { polish(form, o, d, t, goal) };
+    let mut fine = match polished {
         Some(fine) if digits == Digits::Single || fine.error < candidate.error => fine,
-        _ if digits == Digits::Double => candidate,
-        _ => closest_wide(form, o, d, candidate),
+        _ if digits == Digits::Single => closest_wide(form, o, d, candidate),
+        _ => candidate,
     };
     // From a point of the surface, as far as can be told, the distance is none.
     if fine.t.value().abs() <= fine.error {

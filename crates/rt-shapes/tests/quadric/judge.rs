@@ -51,7 +51,8 @@ impl Tally {
                 .min_by(|&i, &j| (left[i].t - exact).abs().total_cmp(&(left[j].t - exact).abs()));
             let Some(root) = near.map(|i| left.remove(i)) else {
                 // A tangent may be reported once for its two exact roots.
-                let same = found.iter().flatten().any(|r| (r.t - exact).abs() <= r.error);
+                let off = |r: &Root| (t - &Rational::from_f64(r.t).unwrap()).to_f64().abs();
+                let same = found.iter().flatten().any(|r| off(r) <= r.error);
                 if !same {
                     self.missed += 1;
                     self.tell(format!("missed {exact:e} of {case:?}: {found:?}"));
