@@ -199,17 +199,20 @@ struct Ask<'a> {
 impl Job for Ask<'_> {
     type Out = [Tally; 2];
 
-    fn run<S: Structure + 'static>(self) -> [Tally; 2] {
+    fn run<S: Structure + 'static>(self, params: S::Params) -> [Tally; 2] {
         let inside = self.case.inside;
         match &self.case.mesh {
             Mesh::Single(mesh) => [
-                ask_mesh::<S, f32, f32>(mesh, inside, self.seed),
-                ask_mesh::<S, f32, f64>(mesh, inside, self.seed),
+                ask_mesh::<S, f32, f32>(mesh, inside, self.seed, &params),
+                ask_mesh::<S, f32, f64>(mesh, inside, self.seed, &params),
             ],
-            Mesh::Double(mesh) => [Tally::default(), ask_mesh::<S, f64, f64>(mesh, inside, self.seed)],
-            Mesh::Spheres(balls) => {
-                [ask_spheres::<S, f32>(balls, self.seed), ask_spheres::<S, f64>(balls, self.seed)]
+            Mesh::Double(mesh) => {
+                [Tally::default(), ask_mesh::<S, f64, f64>(mesh, inside, self.seed, &params)]
             }
+            Mesh::Spheres(balls) => [
+                ask_spheres::<S, f32>(balls, self.seed, &params),
+                ask_spheres::<S, f64>(balls, self.seed, &params),
+            ],
         }
     }
 }
@@ -235,10 +238,11 @@ fn ask_mesh<S: Structure + 'static, V: Real + Into<R>, R: Real>(
     mesh: &TriangleMesh<V>,
     inside: Option<DVec3>,
     seed: u64,
+    params: &S::Params,
 ) -> Tally {
     let start = Instant::now();
     let mut tally = Tally::default();
-    let Ok(scene) = Aggregate::<S, _>::build(mesh.clone(), &S::Params::default()) else { return tally };
+    let Ok(scene) = Aggregate::<S, _>::build(mesh.clone(), params) else { return tally };
     let corners: Vec<Corners> = (0..mesh.triangles().len() as u32)
         .map(|prim| mesh.triangle(prim).corners.map(|c| c.to_array()))
         .collect();
@@ -360,10 +364,10 @@ impl Around {
     }
 }
 
-fn ask_spheres<S: Structure + 'static, R: Real>(balls: &[Sphere], seed: u64) -> Tally {
+fn ask_spheres<S: Structure + 'static, R: Real>(balls: &[Sphere], seed: u64, params: &S::Params) -> Tally {
     let start = Instant::now();
     let mut tally = Tally::default();
-    let Ok(scene) = Aggregate::<S, _>::build(balls.to_vec(), &S::Params::default()) else { return tally };
+    let Ok(scene) = Aggregate::<S, _>::build(balls.to_vec(), params) else { return tally };
     let list = balls.to_vec();
     let boxes: Vec<Aabb> = (0..list.len() as u32).map(|prim| list.bound(prim)).collect();
     let world = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);

@@ -112,9 +112,9 @@ struct Build<'a, R, G> {
 impl<R: Real, G: Surfaced<R> + Bounded + 'static> Job for Build<'_, R, G> {
     type Out = Result<(AnyShape<R, G::At>, Built), BuildError>;
 
-    fn run<S: Structure + 'static>(self) -> Self::Out {
+    fn run<S: Structure + 'static>(self, params: S::Params) -> Self::Out {
         let start = Instant::now();
-        let scene = Aggregate::<S, G>::build_watched(self.geometry, &S::Params::default(), self.watch)?;
+        let scene = Aggregate::<S, G>::build_watched(self.geometry, &params, self.watch)?;
         let structure = scene.structure();
         let built =
             Built { time: start.elapsed(), bytes: structure.bytes(), skipped: structure.skipped().len() };

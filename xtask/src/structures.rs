@@ -6,19 +6,23 @@ use rt_accel::Structure;
 pub(crate) trait Job {
     /// What comes of it.
     type Out;
-    /// Does it.
-    fn run<S: Structure + 'static>(self) -> Self::Out;
+    /// Does it, with the parameters that the name stands for.
+    fn run<S: Structure + 'static>(self, params: S::Params) -> Self::Out;
 }
 
 macro_rules! structures {
-    ($($name:literal => $structure:ty),* $(,)?) => {
+    ($($name:literal => $structure:ty $(= $params:expr)?),* $(,)?) => {
         /// All names.
         pub(crate) const NAMES: &[&str] = &[$($name),*];
 
         /// Does `job` with the structure called `name`; without such a structure, says which there are.
         pub(crate) fn with<J: Job>(name: &str, job: J) -> Result<J::Out, String> {
             match name {
-                $($name => Ok(job.run::<$structure>()),)*
+                $($name => {
+                    let params = None::<<$structure as Structure>::Params>;
+                    $(let params = Some($params);)?
+                    Ok(job.run::<$structure>(params.unwrap_or_default()))
+                })*
                 _ => Err(format!("there is no structure {name:?}; there are {}", NAMES.join(", "))),
             }
         }
@@ -28,4 +32,7 @@ macro_rules! structures {
 structures! {
     "bvh" => rt_bvh::Bvh,
     "exhaustive" => rt_accel::Exhaustive,
+    "grid" => rt_grid::Grid,
+    "grid:nested" => rt_grid::Grid = rt_grid::GridParams::nested(),
+    "grid:two-level" => rt_grid::Grid = rt_grid::GridParams::two_level(),
 }

@@ -16,7 +16,7 @@ use rt_geom::{Ray, Real};
 /// Parts that one thread deals out at a time: fixed, so that the grid does not depend on the number of threads.
 const ALONE: usize = 1 << 11;
 /// How many cells the box of a primitive may overlap on average, in the first grid and in those within.
-const MOST_OVERLAPS: [u64; 2] = [256, 16];
+pub(crate) const MOST_OVERLAPS: [u64; 2] = [256, 16];
 /// What entering a grid costs, in cells passed.
 const ENTER: f64 = 6.0;
 /// Bytes for each reference while a grid is filled.

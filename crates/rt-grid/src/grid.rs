@@ -15,7 +15,7 @@ pub const MAX_DEPTH: usize = 12;
 /// Five bytes a cell, and four a reference.
 ///
 /// Source: Lagae and Dutré, "Compact, fast and robust grids for ray tracing", EGSR 2008, for the layout.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     pub(crate) origin: DVec3,
     pub(crate) bound: Aabb,

@@ -15,14 +15,14 @@ const U: f64 = f64::EPSILON / 2.0;
 /// A ray relative to the origin of a grid, its direction brought to a length of 1 to 2 by a power of two, and its interval in that
 /// unit, rounded outward.
 #[derive(Clone, Copy, Debug)]
-struct Line {
+pub(crate) struct Line {
     origin: [f64; 3],
     dir: [f64; 3],
     /// Infinite: parallel.
     inverse: [f64; 3],
-    near: f64,
-    far: f64,
-    unit: f64,
+    pub(crate) near: f64,
+    pub(crate) far: f64,
+    pub(crate) unit: f64,
     /// Where `origin` lies on the ray that was given, and what was rounded off it.
     start: f64,
     lost: f64,
@@ -30,7 +30,7 @@ struct Line {
 
 impl Line {
     #[inline(always)]
-    fn new<R: Real>(ray: &Ray<R>, origin: [f64; 3]) -> Line {
+    pub(crate) fn new<R: Real>(ray: &Ray<R>, origin: [f64; 3]) -> Line {
         let wide = ray.widen();
         let (o, d) = (wide.origin.to_array(), wide.dir.to_array());
         let most = wide.dir.abs().max_element();
@@ -64,7 +64,7 @@ impl Line {
 
     /// Where it enters and leaves a box, rounded outward, within `[near, far]`; `None` for a certain miss.
     #[inline(always)]
-    fn span(&self, voxels: &Voxels, near: f64, far: f64) -> Option<[f64; 2]> {
+    pub(crate) fn span(&self, voxels: &Voxels, near: f64, far: f64) -> Option<[f64; 2]> {
         let (mut from, mut to) = (near, far);
         for a in 0..3 {
             let (o, i) = (self.origin[a], self.inverse[a]);
@@ -126,11 +126,11 @@ impl Line {
 
 /// A walk through one grid.
 #[derive(Clone, Copy, Debug)]
-struct Walk {
+pub(crate) struct Walk {
     /// The cell, among those of all grids.
-    cell: usize,
+    pub(crate) cell: usize,
     /// When the walk entered the cell, and when it leaves the grid or the outer cell.
-    entered: f64,
+    pub(crate) entered: f64,
     end: f64,
     /// When the cell's exit plane is crossed along each axis: plane `next`, at `next * pace + base`; never the grid's own border.
     exit: [f64; 3],
@@ -148,7 +148,7 @@ struct Walk {
 impl Walk {
     /// Walks `line` through a grid between two times at which it is in the grid's box.
     #[inline(always)]
-    fn enter(line: Line, voxels: &Voxels, from: f64, to: f64) -> Walk {
+    pub(crate) fn enter(line: Line, voxels: &Voxels, from: f64, to: f64) -> Walk {
         let strides = voxels.strides();
         let mut walk = Walk {
             cell: voxels.first,
@@ -222,7 +222,7 @@ impl Walk {
 
     /// Goes on to the next cell; `false` at the end.
     #[inline(always)]
-    fn advance(&mut self) -> bool {
+    pub(crate) fn advance(&mut self) -> bool {
         let a = self.first();
         let at = self.exit[a];
         // Infinite where no plane is left.
