@@ -10,6 +10,16 @@ pub(crate) trait Job {
     fn run<S: Structure + 'static>(self, params: S::Params) -> Self::Out;
 }
 
+/// The parameters that stand beside a name, or the default.
+macro_rules! params {
+    ($structure:ty) => {
+        <$structure as Structure>::Params::default()
+    };
+    ($structure:ty, $params:expr) => {
+        $params
+    };
+}
+
 macro_rules! structures {
     ($($name:literal => $structure:ty $(= $params:expr)?),* $(,)?) => {
         /// All names.
@@ -18,11 +28,7 @@ macro_rules! structures {
         /// Does `job` with the structure called `name`; without such a structure, says which there are.
         pub(crate) fn with<J: Job>(name: &str, job: J) -> Result<J::Out, String> {
             match name {
-                $($name => {
-                    let params = None::<<$structure as Structure>::Params>;
-                    $(let params = Some($params);)?
-                    Ok(job.run::<$structure>(params.unwrap_or_default()))
-                })*
+                $($name => Ok(job.run::<$structure>(params!($structure $(, $params)?))),)*
                 _ => Err(format!("there is no structure {name:?}; there are {}", NAMES.join(", "))),
             }
         }

@@ -52,7 +52,7 @@
 //!    hence `P`. It is walked between the two times at which the outer walk enters and leaves the cell; `t` is one of those by 2.
 //!
 //! A ray that starts too far away for 1. is carried nearer along itself, with twice the digits: the new origin is within
-//! `2^-100` of the way and one rounding of itself. One that is too far even for that (2^70 sides) visits every reference of the grid.
+//! `2^-102` of the way, which may be `2^-28` of a side at most, and one rounding of itself. One that is too far even for that (some 2^70 sides) visits every reference of the grid.
 //!
 //! A direction whose component is so small that its reciprocal is infinite counts as parallel to that axis: over any distance at which
 //! there are `f32` boxes it moves by less than `2^-26` of a side.

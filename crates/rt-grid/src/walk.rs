@@ -12,6 +12,9 @@ use rt_geom::{Ray, Real, Vector};
 /// Half a unit in the last place of 1.
 const U: f64 = f64::EPSILON / 2.0;
 
+/// Empty cells from here on are leapt over: a leap costs as much as some three steps.
+const LEAP: u8 = 4;
+
 /// A ray relative to the origin of a grid, its direction brought to a length of 1 to 2 by a power of two, and its interval in that
 /// unit, rounded outward.
 #[derive(Clone, Copy, Debug)]
@@ -341,7 +344,7 @@ impl Grid {
                     walk.line.shorten(ray.t_max);
                     walk.advance()
                 }
-                1 => walk.advance(),
+                distance if distance < LEAP => walk.advance(),
                 distance => walk.leap(distance as u32),
             };
             if goes_on {

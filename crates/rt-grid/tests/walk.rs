@@ -1,7 +1,7 @@
 //! The walk visits the right cells, as many as geometry says; and what cannot matter does not.
 
 use core::ops::ControlFlow;
-use rt_accel::{Aggregate, Bounded, BuildError, Counts, Leaf, Primitive, Structure, Visitor};
+use rt_accel::{Aggregate, Bounded, BuildError, Counts, Exhaustive, Leaf, Primitive, Structure, Visitor};
 use rt_bounds::Aabb;
 use rt_geom::glam::{DVec3, Vec3A};
 use rt_geom::{Ray, Real, Vector};
@@ -215,7 +215,7 @@ fn mailboxes_and_leaps_change_no_answer() {
                 assert_eq!(counts[mailed].prims + counts[mailed].spared, counts[0].prims);
                 assert!(!long || counts[mailed].spared > counts[0].prims / 10, "{counts:?}");
             }
-            assert!(long || base == nested || counts[3].nodes * 4 < counts[0].nodes * 3, "{counts:?}");
+            assert!(long || base == nested || counts[3].nodes * 10 < counts[0].nodes * 9, "{counts:?}");
             assert_eq!((counts[3].prims, counts[3].leaves), (counts[0].prims, counts[0].leaves));
         }
     }
@@ -271,5 +271,42 @@ fn memory_is_refused_before_it_is_used() {
         let few = soup::uniform(2, 1);
         let grid = Grid::build(&few, &GridParams { resolution: rule, ..GridParams::default() }).unwrap();
         assert!(grid.statistics().box_references <= 512, "{:?}", grid.statistics());
+    }
+}
+
+/// Through the middle of a ball, exactly, from up to 2^900 away; and through points beside it from where that is exact.
+#[test]
+fn rays_from_very_far_hit_what_they_hit() {
+    let mesh = soup::icosphere(1);
+    let truth = Aggregate::<Exhaustive, _>::build(&mesh, &()).unwrap();
+    let fine = GridParams { resolution: Resolution::Fixed([12; 3]), ..GridParams::default() };
+    for params in [fine, GridParams::nested(), GridParams::two_level()] {
+        let scene = Aggregate::<Grid, _>::build(&mesh, &params).unwrap();
+        let (mut random, mut hits) = (Seeded::new(9), 0);
+        for i in 0..300 {
+            let d = [0; 3].map(|_| random.below(9) as f64 - 4.0);
+            let d = DVec3::from_array(d);
+            if d == DVec3::ZERO {
+                continue;
+            }
+            let through = [0; 3].map(|_| (random.below(513) as f64 - 256.0) / 256.0);
+            let near = DVec3::from_array(through);
+            let (through, away) = match i % 3 {
+                0 => (near, [10, 20, 30, 40][i / 3 % 4]),
+                _ => (DVec3::ZERO, [10, 22, 24, 30, 60, 75, 80, 110, 500, 900][i / 3 % 10]),
+            };
+            let o = through - d * 2f64.powi(away);
+            let ray = Ray::new(o, d);
+            let hit = scene.intersect(&ray);
+            assert_eq!(hit, truth.intersect(&ray), "{o} {d}");
+            assert_eq!(scene.intersect_p(&ray), hit.is_some());
+            hits += hit.is_some() as u32;
+            // The same in f32, where it is exact.
+            if through == DVec3::ZERO && away < 120 {
+                let ray = Ray::new(o.as_vec3a(), d.as_vec3a());
+                assert_eq!(scene.intersect(&ray), truth.intersect(&ray), "{o} {d}");
+            }
+        }
+        assert!(hits > 140, "{hits} hits");
     }
 }
