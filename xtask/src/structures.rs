@@ -1,8 +1,9 @@
 //! The structures, by name: the one place where names become types. Variants follow a colon.
 
-use rt_accel::{Exhaustive, Structure};
+use rt_accel::{Clip, Exhaustive, Structure};
 use rt_bvh::{Bvh, BvhParams};
-use rt_kdtree::{Clip, KdTree, KdTreeParams};
+use rt_grid::{Grid, GridParams};
+use rt_kdtree::{KdTree, KdTreeParams};
 
 /// Something to be done with a structure whose name was given.
 pub(crate) trait Job {
@@ -31,5 +32,8 @@ structures! {
     "bvh" => Bvh: BvhParams::default(),
     "kdtree" => KdTree: KdTreeParams::default(),
     "kdtree:box" => KdTree: KdTreeParams { clip: Clip::Box, ..KdTreeParams::default() },
+    "grid" => Grid: GridParams::default(),
+    "grid:nested" => Grid: GridParams::nested(),
+    "grid:two-level" => Grid: GridParams::two_level(),
     "exhaustive" => Exhaustive: (),
 }

@@ -33,6 +33,15 @@ pub trait Bounded: Send + Sync {
     }
 }
 
+/// What of a primitive counts in a cell: a knob of structures that divide space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clip {
+    /// The part of it that lies in the cell ([`Bounded::clipped_bound`]): exact for triangles.
+    Exact,
+    /// The part of its box. Builds faster, and cells have more references.
+    Box,
+}
+
 /// The primitive numbers of one leaf.
 ///
 /// `first` names the leaf: no two leaves share it, and it stays below the number of references.

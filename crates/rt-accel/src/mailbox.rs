@@ -1,4 +1,4 @@
-//! [`Mailbox`]: which primitives a ray has met, for structures that repeat primitives.
+//! [`Mailbox`]: which primitives a ray has met; [`Mailing`]: the knob for it. For structures that repeat primitives.
 
 use crate::{Leaf, Visitor};
 use core::ops::ControlFlow;
@@ -130,6 +130,17 @@ impl<const N: usize> Mailbox for InverseMailbox<N> {
         }
         !known
     }
+}
+
+/// Whether rays remember whom they were tested against, and how: for the knobs of structures that repeat primitives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mailing {
+    /// They do not.
+    None,
+    /// In a [`HashedMailbox`].
+    Hashed,
+    /// In an [`InverseMailbox`].
+    Inverse,
 }
 
 #[cfg(test)]

@@ -3,34 +3,12 @@
 use crate::node::{KdTree, MAX_DEPTH, Node, cut};
 use crate::sweep::{Event, Events, Kind, Plane, cheapest};
 use rt_accel::{
-    Bounded, Boxes, BuildError, HashedMailbox, Invalid, InverseMailbox, Leaf, NoMailbox, Sah, Structure,
-    Visitor, Watch,
+    Bounded, Boxes, BuildError, Clip, HashedMailbox, Invalid, InverseMailbox, Leaf, Mailing, NoMailbox, Sah,
+    Structure, Visitor, Watch,
 };
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Axis, Ray, Real};
-
-/// What of a primitive counts in a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clip {
-    /// The part of it that lies in the cell: "perfect splits".
-    ///
-    /// Source: Havran and Bittner, "On improving kd-trees for ray shooting", WSCG 2002.
-    Exact,
-    /// The part of its box. Builds faster, trees have more references.
-    Box,
-}
-
-/// Whether rays remember whom they were tested against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mailing {
-    /// They do not.
-    None,
-    /// In a [`HashedMailbox`] of 8.
-    Hashed,
-    /// In an [`InverseMailbox`] of 8.
-    Inverse,
-}
 
 /// The knobs of a [`KdTree`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +22,8 @@ pub struct KdTreeParams {
     /// Most splits on a way, in `0..=60`; `None` for `8 + 1.3 log2 n` (Pharr and Humphreys 2004, section 4.4).
     pub max_depth: Option<u32>,
     /// What of a primitive counts in a cell.
+    ///
+    /// Source: Havran and Bittner, "On improving kd-trees for ray shooting", WSCG 2002 ("perfect splits").
     pub clip: Clip,
     /// Whether rays remember whom they were tested against.
     pub mailing: Mailing,
@@ -161,7 +141,7 @@ impl Structure for KdTree {
     fn traverse<R: Real>(&self, ray: &mut Ray<R>, visit: &mut impl Visitor<R>) {
         match self.mailing {
             Mailing::None => self.walk::<R, NoMailbox>(ray, visit),
-            Mailing::Hashed => self.walk::<R, HashedMailbox<8>>(ray, visit),
+            Mailing::Hashed => self.walk::<R, HashedMailbox<16>>(ray, visit),
             Mailing::Inverse => self.walk::<R, InverseMailbox<8>>(ray, visit),
         }
     }

@@ -45,5 +45,5 @@ mod node;
 mod sweep;
 mod walk;
 
-pub use build::{Clip, KdTreeParams, Mailing};
+pub use build::KdTreeParams;
 pub use node::{KdTree, MAX_DEPTH, Node, Statistics};

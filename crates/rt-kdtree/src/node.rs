@@ -1,8 +1,7 @@
 //! [`Node`] and [`KdTree`]: the tree.
 
-use crate::build::Mailing;
 use bytemuck::{Pod, Zeroable};
-use rt_accel::{Bounded, Invalid, Sah};
+use rt_accel::{Bounded, Invalid, Mailing, Sah};
 use rt_bounds::Aabb;
 use rt_geom::Axis;
 use rt_geom::glam::{DVec3, Vec3A};

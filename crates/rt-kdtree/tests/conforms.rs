@@ -1,9 +1,9 @@
 //! The tree answers as every primitive in turn does, bit for bit: closest, any, all, many; in both precisions.
 
-use rt_accel::Sah;
+use rt_accel::{Clip, Mailing, Sah};
 use rt_geom::Real;
 use rt_geom::glam::DVec3;
-use rt_kdtree::{Clip, KdTree, KdTreeParams, Mailing};
+use rt_kdtree::{KdTree, KdTreeParams};
 use rt_measure::conform;
 use rt_measure::rays::troublesome;
 use rt_scenes::{SceneGeometry, Solid, Trial};

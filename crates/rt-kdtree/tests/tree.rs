@@ -1,10 +1,10 @@
 //! What must hold of the tree itself: its statistics, its shape, its bounds of depth and memory.
 
 use core::ops::ControlFlow;
-use rt_accel::{BuildError, Leaf, Structure, Visitor};
+use rt_accel::{BuildError, Clip, Leaf, Structure, Visitor};
 use rt_geom::Ray;
 use rt_geom::glam::Vec3A;
-use rt_kdtree::{Clip, KdTree, KdTreeParams, MAX_DEPTH};
+use rt_kdtree::{KdTree, KdTreeParams, MAX_DEPTH};
 use rt_measure::rays;
 use rt_scenes::soup;
 use rt_shapes::TriangleMesh;

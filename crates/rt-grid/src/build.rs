@@ -1,0 +1,427 @@
+//! The build: parts of primitives dealt out to cells; crowded cells again.
+
+use crate::clouds::{GRID, LEAF, spread};
+use crate::grid::Grid;
+use crate::measure;
+use crate::params::{GridParams, Nest, Resolution, Skip};
+use crate::voxels::{Voxels, resolve, restrained};
+use rt_accel::{
+    Bounded, Boxes, BuildError, Clip, HashedMailbox, Invalid, InverseMailbox, Leaf, Mailing, NoMailbox,
+    Structure, Visitor, Watch,
+};
+use rt_bounds::Aabb;
+use rt_geom::glam::DVec3;
+use rt_geom::{Ray, Real};
+
+/// Parts that one thread deals out at a time: fixed, so that the grid does not depend on the number of threads.
+const ALONE: usize = 1 << 11;
+/// How many cells the box of a primitive may overlap on average, in the first grid and in those within.
+pub(crate) const MOST_OVERLAPS: [u64; 2] = [256, 16];
+/// What entering a grid costs, in cells passed.
+const ENTER: f64 = 6.0;
+/// Bytes for each reference while a grid is filled.
+const PER_REFERENCE: usize = size_of::<(u32, u32)>() + 2 * size_of::<u32>();
+
+impl Structure for Grid {
+    type Params = GridParams;
+
+    fn build_watched(
+        source: &dyn Bounded,
+        params: &GridParams,
+        watch: Watch<'_>,
+    ) -> Result<Grid, BuildError> {
+        params.check()?;
+        let len = source.prim_count();
+        let needed = len.saturating_mul(2 * size_of::<Part>() + PER_REFERENCE);
+        if let Some(limit) = params.memory_limit.filter(|&limit| needed > limit) {
+            return Err(BuildError::OutOfMemory { needed, limit });
+        }
+        if watch(0.0).is_break() {
+            return Err(BuildError::Cancelled);
+        }
+        let Boxes { origin, prims, skipped, world } = Boxes::read(source)?;
+        let valid = prims.len();
+        let finite = |b: &Aabb| b.min.is_finite() && b.max.is_finite();
+        let (parts, without_end): (Vec<Part>, Vec<Part>) = prims.into_iter().partition(|(_, b)| finite(b));
+        let outside: Vec<u32> = without_end.iter().map(|(prim, _)| *prim).collect();
+        let mut grid = Grid {
+            origin,
+            bound: world,
+            grids: Vec::new(),
+            kinds: Vec::new(),
+            starts: Vec::new(),
+            outside: outside.len(),
+            refs: outside,
+            skipped,
+            repeats: false,
+            mailing: Mailing::None,
+            overlaps: 0,
+        };
+        if !parts.is_empty() {
+            Builder { source, origin, params, prims: valid }.build(parts, &mut grid, watch)?;
+        }
+        let links = grid.grids.len().saturating_sub(1);
+        grid.repeats = grid.refs.len() - links > valid;
+        grid.mailing = if grid.repeats { params.mailing } else { Mailing::None };
+        if watch(1.0).is_break() {
+            return Err(BuildError::Cancelled);
+        }
+        Ok(grid)
+    }
+
+    fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    fn local_bound(&self) -> Aabb {
+        self.bound
+    }
+
+    fn skipped(&self) -> &[u32] {
+        &self.skipped
+    }
+
+    fn repeats(&self) -> bool {
+        self.repeats
+    }
+
+    fn bytes(&self) -> usize {
+        self.kinds.capacity()
+            + (self.starts.capacity() + self.refs.capacity() + self.skipped.capacity()) * size_of::<u32>()
+            + self.grids.capacity() * size_of::<Voxels>()
+    }
+
+    #[inline]
+    fn traverse<R: Real>(&self, ray: &mut Ray<R>, visit: &mut impl Visitor<R>) {
+        match self.mailing {
+            Mailing::None => self.walk::<R, NoMailbox>(ray, visit),
+            Mailing::Hashed => self.walk::<R, HashedMailbox<16>>(ray, visit),
+            Mailing::Inverse => self.walk::<R, InverseMailbox<8>>(ray, visit),
+        }
+    }
+
+    fn gather(&self, keep: &mut dyn FnMut(&Aabb) -> bool, each: &mut dyn FnMut(Leaf<'_>)) {
+        self.gather_within(keep, each);
+    }
+
+    fn validate(&self, prims: &dyn Bounded) -> Result<(), Invalid> {
+        self.check(prims)
+    }
+}
+
+/// A primitive, and the box of what of it lies in the grid at hand.
+pub(crate) type Part = (u32, Aabb);
+
+/// A grid to be filled.
+struct Task {
+    bound: Aabb,
+    parts: Vec<Part>,
+    count: [u32; 3],
+}
+
+/// A grid that is filled: which parts lie in which cell.
+struct Filled {
+    voxels: Voxels,
+    starts: Vec<u32>,
+    /// Numbers of parts, cell after cell.
+    slots: Vec<u32>,
+    overlaps: u64,
+    /// Cells to become grids, in ascending order.
+    nested: Vec<(usize, Task)>,
+    parts: Vec<Part>,
+}
+
+struct Builder<'a> {
+    source: &'a dyn Bounded,
+    origin: DVec3,
+    params: &'a GridParams,
+    prims: usize,
+}
+
+impl Builder<'_> {
+    fn build(&self, parts: Vec<Part>, grid: &mut Grid, watch: Watch<'_>) -> Result<(), BuildError> {
+        let bound = parts.iter().fold(Aabb::EMPTY, |b, (_, part)| b.union(*part));
+        let count = match self.params.resolution {
+            Resolution::Measured { rays } => measure::resolution(&bound, &parts, rays, self.params.sah),
+            rule => resolve(rule, &bound, parts.len()),
+        };
+        let count = match self.params.resolution {
+            Resolution::Fixed(_) => count,
+            _ => restrained(count, &bound, &parts, MOST_OVERLAPS[0]),
+        };
+        let mut tasks = vec![Task { bound, parts, count }];
+        let levels = if self.params.nest == Nest::Never { 0 } else { self.params.depth };
+        for level in 0..=levels {
+            let (total, mut done) = (tasks.len(), 0);
+            let first_below = grid.grids.len() + total;
+            let mut below = Vec::new();
+            let mut waiting = core::mem::take(&mut tasks).into_iter();
+            loop {
+                let batch: Vec<Task> = waiting.by_ref().take(64).collect();
+                if batch.is_empty() {
+                    break;
+                }
+                done += batch.len();
+                for filled in grow(batch, |task| self.filled(task, level < levels, grid.bytes())) {
+                    let filled = filled?;
+                    self.append(grid, filled, first_below, &mut below)?;
+                }
+                // Half of what is left for each level.
+                let before = 1.0 - 0.5f32.powi(level as i32);
+                let progress = before + (1.0 - before) * 0.5 * done as f32 / total as f32;
+                if watch(progress.min(0.999)).is_break() {
+                    return Err(BuildError::Cancelled);
+                }
+            }
+            tasks = below;
+            if tasks.is_empty() {
+                break;
+            }
+        }
+        grid.starts.push(grid.refs.len() as u32);
+        grid.kinds.shrink_to_fit();
+        grid.starts.shrink_to_fit();
+        grid.refs.shrink_to_fit();
+        grid.grids.shrink_to_fit();
+        Ok(())
+    }
+
+    /// Puts a filled grid behind the others.
+    fn append(
+        &self,
+        grid: &mut Grid,
+        filled: Filled,
+        first_below: usize,
+        below: &mut Vec<Task>,
+    ) -> Result<(), BuildError> {
+        let Filled { mut voxels, starts, slots, overlaps, nested, parts } = filled;
+        voxels.first = grid.kinds.len();
+        let cells = starts.len() - 1;
+        let most = u32::MAX as usize;
+        if grid.refs.len() + slots.len() > most || voxels.first + cells > most {
+            return Err(BuildError::TooManyPrimitives { len: grid.refs.len() + slots.len(), max: most });
+        }
+        self.within(grid.bytes() + cells * 5 + slots.len() * 4 + below.len() * size_of::<Task>())?;
+        grid.overlaps += overlaps;
+        let mut nested = nested.into_iter().peekable();
+        for cell in 0..cells {
+            grid.starts.push(grid.refs.len() as u32);
+            let here = &slots[starts[cell] as usize..starts[cell + 1] as usize];
+            if let Some((_, task)) = nested.next_if(|(at, _)| *at == cell) {
+                grid.kinds.push(GRID);
+                grid.refs.push((first_below + below.len()) as u32);
+                below.push(task);
+            } else {
+                grid.kinds.push(if here.is_empty() { 1 } else { LEAF });
+                grid.refs.extend(here.iter().map(|slot| parts[*slot as usize].0));
+            }
+        }
+        if self.params.skip == Skip::Clouds {
+            spread(&mut grid.kinds[voxels.first..], voxels.count);
+        }
+        grid.grids.push(voxels);
+        Ok(())
+    }
+
+    /// Deals the parts of a grid out to its cells.
+    fn filled(&self, task: Task, may_nest: bool, held: usize) -> Result<Filled, BuildError> {
+        let voxels = Voxels::new(&task.bound, task.count, 0);
+        let cells = voxels.cells();
+        let held =
+            held.saturating_add(cells.saturating_mul(9)).saturating_add(self.prims * size_of::<Part>());
+        self.within(held)?;
+        let most = self.params.memory_limit.map_or(usize::MAX, |limit| (limit - held) / PER_REFERENCE);
+        let most = most.min(u32::MAX as usize - 1);
+        // Which parts lie in which cells, some parts at a time, on all cores.
+        let chunks: Vec<(u32, &[Part])> =
+            task.parts.chunks(ALONE).enumerate().map(|(i, chunk)| ((i * ALONE) as u32, chunk)).collect();
+        let mut pairs = Vec::new();
+        let mut total = 0;
+        for some in chunks.chunks(16) {
+            for found in grow(some.to_vec(), |(first, chunk)| self.register(&voxels, first, chunk, most)) {
+                total += found.len();
+                pairs.push(found);
+            }
+            if total > most {
+                let needed = held.saturating_add(total.saturating_mul(PER_REFERENCE));
+                return match self.params.memory_limit {
+                    Some(limit) => Err(BuildError::OutOfMemory { needed, limit }),
+                    None => Err(BuildError::TooManyPrimitives { len: total, max: most }),
+                };
+            }
+        }
+        // Counted, then put in place: ascending numbers in each cell.
+        let mut starts = vec![0u32; cells + 1];
+        for (cell, _) in pairs.iter().flatten() {
+            starts[*cell as usize + 1] += 1;
+        }
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
+        }
+        let mut slots = vec![0u32; total];
+        for (cell, slot) in pairs.iter().flatten() {
+            let place = &mut starts[*cell as usize];
+            slots[*place as usize] = *slot;
+            *place += 1;
+        }
+        // Each start has become the next one's.
+        starts.copy_within(0..cells, 1);
+        starts[0] = 0;
+        drop(pairs);
+        let overlaps = voxels.overlaps(task.parts.iter().map(|(_, part)| part));
+        let mut filled = Filled { voxels, starts, slots, overlaps, nested: Vec::new(), parts: task.parts };
+        if may_nest {
+            filled.nested = self.nested(&filled);
+        }
+        Ok(filled)
+    }
+
+    /// The cells of each part, and the part's number.
+    fn register(&self, voxels: &Voxels, first: u32, parts: &[Part], most: usize) -> Vec<(u32, u32)> {
+        let strides = voxels.strides();
+        let mut pairs = Vec::with_capacity(parts.len() * 2);
+        for (slot, (prim, part)) in (first..).zip(parts) {
+            let whole = voxels.ranges(part);
+            // Rows along the axis of most cells; stacks of them along that of fewest.
+            let spans = whole.map(|[from, to]| to - from);
+            let (mut stack, mut row) = (0, 0);
+            for a in 1..3 {
+                stack = if spans[a] < spans[stack] { a } else { stack };
+                row = if spans[a] >= spans[row] { a } else { row };
+            }
+            let column = 3 - stack - row;
+            // Along one axis there is nothing to cut: a part reaches through all of its box.
+            let cut = self.params.clip == Clip::Exact && spans[column] > 0;
+            let cut_to = |within: &Aabb, a: usize, cell: u32| {
+                let mut region = *within;
+                let [low, high] = voxels.slab(a, cell);
+                region.min[a] = low;
+                region.max[a] = high;
+                let part =
+                    self.source.clipped_bound(*prim, &region, self.origin).overlap(*within).overlap(region);
+                part.is_valid().then_some(part)
+            };
+            let mut run = |ranges: [u32; 2], at: usize| {
+                let at = at + ranges[0] as usize * strides[row];
+                let cells = (0..=(ranges[1] - ranges[0]) as usize).map(|i| at + i * strides[row]);
+                if pairs.len() <= most {
+                    pairs.extend(cells.map(|cell| (cell as u32, slot)));
+                }
+            };
+            for i in whole[stack][0]..=whole[stack][1] {
+                let at = i as usize * strides[stack];
+                let layer = if cut && spans[stack] > 0 {
+                    match cut_to(part, stack, i) {
+                        Some(layer) => layer,
+                        None => continue,
+                    }
+                } else {
+                    *part
+                };
+                let [from, to] = if cut {
+                    voxels.range(column, layer.min[column], layer.max[column])
+                } else {
+                    whole[column]
+                };
+                for j in from..=to {
+                    let at = at + j as usize * strides[column];
+                    if !cut {
+                        run(whole[row], at);
+                    } else if from == to {
+                        run(voxels.range(row, layer.min[row], layer.max[row]), at);
+                    } else if let Some(piece) = cut_to(&layer, column, j) {
+                        run(voxels.range(row, piece.min[row], piece.max[row]), at);
+                    }
+                }
+            }
+        }
+        pairs
+    }
+
+    /// The cells of a grid that shall be grids.
+    fn nested(&self, filled: &Filled) -> Vec<(usize, Task)> {
+        let full: Vec<usize> =
+            (0..filled.starts.len() - 1).filter(|c| filled.starts[*c] < filled.starts[c + 1]).collect();
+        let chunks: Vec<&[usize]> = full.chunks(ALONE / 8).collect();
+        let found = grow(chunks, |cells| {
+            cells.iter().filter_map(|cell| Some((*cell, self.inner(filled, *cell)?))).collect::<Vec<_>>()
+        });
+        found.into_iter().flatten().collect()
+    }
+
+    /// The grid that a cell shall be, if it shall.
+    fn inner(&self, filled: &Filled, cell: usize) -> Option<Task> {
+        let voxels = &filled.voxels;
+        let slots = &filled.slots[filled.starts[cell] as usize..filled.starts[cell + 1] as usize];
+        let least = match self.params.nest {
+            Nest::Never => return None,
+            Nest::Above(most) => most as usize + 1,
+            Nest::Cheaper => 2,
+        };
+        if slots.len() < least {
+            return None;
+        }
+        let region = voxels.cell(voxels.at(cell));
+        let mut parts = Vec::with_capacity(slots.len());
+        let mut bound = Aabb::EMPTY;
+        for slot in slots {
+            let (prim, whole) = filled.parts[*slot as usize];
+            let part = match self.params.clip {
+                Clip::Exact => {
+                    self.source.clipped_bound(prim, &region, self.origin).overlap(whole).overlap(region)
+                }
+                Clip::Box => whole.overlap(region),
+            };
+            // What only seemed to reach in may be left out.
+            if part.is_valid() {
+                parts.push((prim, part));
+                bound = bound.union(part);
+            }
+        }
+        if parts.is_empty() {
+            return None;
+        }
+        let count = resolve(self.params.inner, &bound, parts.len());
+        let count = match self.params.inner {
+            Resolution::Fixed(_) => count,
+            _ => restrained(count, &bound, &parts, MOST_OVERLAPS[1]),
+        };
+        if self.params.nest == Nest::Cheaper {
+            let inner = Voxels::new(&bound, count, 0);
+            let overlaps = inner.overlaps(parts.iter().map(|(_, part)| part)) as f64;
+            let share = |part: f64, whole: f64| if whole > 0.0 { (part / whole).min(1.0) } else { 1.0 };
+            let [area, of_cell] = inner.areas();
+            let entered = share(area, voxels.areas()[1]);
+            let (pass, test) = (self.params.sah.traverse as f64, self.params.sah.intersect as f64);
+            let walk = (ENTER + inner.steps()) * pass + share(of_cell, area) * overlaps * test;
+            if ENTER * pass + entered * walk >= slots.len() as f64 * test {
+                return None;
+            }
+        }
+        Some(Task { bound, parts, count })
+    }
+
+    fn within(&self, needed: usize) -> Result<(), BuildError> {
+        match self.params.memory_limit {
+            Some(limit) if needed > limit => Err(BuildError::OutOfMemory { needed, limit }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Does some work for each item, on all cores where that is enabled; results in order.
+#[cfg(feature = "parallel")]
+fn grow<T: Send, U: Send>(items: Vec<T>, work: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
+    use rayon::prelude::*;
+    if items.len() < 2 {
+        return items.into_iter().map(work).collect();
+    }
+    items.into_par_iter().map(work).collect()
+}
+
+#[cfg(not(feature = "parallel"))]
+fn grow<T, U>(items: Vec<T>, work: impl Fn(T) -> U) -> Vec<U> {
+    items.into_iter().map(work).collect()
+}
