@@ -86,10 +86,29 @@ impl<const N: usize> Expansion<N> {
     /// `self + other`. `S` is at least `N + M`.
     ///
     /// Source: Shewchuk 1997, figure 13 (fast expansion sum with zero elimination).
+    #[inline(always)]
     pub fn plus<const M: usize, const S: usize>(&self, other: &Expansion<M>) -> Expansion<S> {
+        self.merged(other, 1.0)
+    }
+
+    /// `self - other`. `S` is at least `N + M`.
+    #[inline(always)]
+    pub fn minus<const M: usize, const S: usize>(&self, other: &Expansion<M>) -> Expansion<S> {
+        self.merged(other, -1.0)
+    }
+
+    /// `self + sign * other`. Inlined, as are all that return large arrays: they then are written where they are wanted.
+    #[inline(always)]
+    fn merged<const M: usize, const S: usize>(&self, other: &Expansion<M>, sign: f64) -> Expansion<S> {
         const { assert!(S >= N + M) };
-        let (a, b) = (&self.parts[..self.len], &other.parts[..other.len]);
         let mut sum = Expansion::<S>::ZERO;
+        sum.merge(&self.parts[..self.len], &other.parts[..other.len], sign);
+        sum
+    }
+
+    /// Becomes `a + sign * b`, from zero. The capacity must hold the result.
+    #[inline(never)]
+    fn merge(&mut self, a: &[f64], b: &[f64], sign: f64) {
         let (mut i, mut j) = (0, 0);
         // Merged in order of magnitude, each component is absorbed by a running total.
         let mut take = || {
@@ -99,56 +118,58 @@ impl<const N: usize> Expansion<N> {
                 taken = *a.get(i)?;
                 i += 1;
             } else {
-                taken = b[j];
+                taken = sign * b[j];
                 j += 1;
             }
             Some(taken)
         };
-        let Some(mut total) = take() else { return sum };
+        let Some(mut total) = take() else { return };
         while let Some(x) = take() {
             let (t, e) = two_sum(total, x);
-            sum.push(e);
+            self.push(e);
             total = t;
         }
-        sum.push(total);
-        sum
+        self.push(total);
     }
 
     /// `-self`.
     #[inline]
     pub fn negated(&self) -> Self {
-        Expansion { parts: self.parts.map(|x| -x), len: self.len }
-    }
-
-    /// `self - other`. `S` is at least `N + M`.
-    #[inline]
-    pub fn minus<const M: usize, const S: usize>(&self, other: &Expansion<M>) -> Expansion<S> {
-        self.plus(&other.negated())
+        let mut negative = *self;
+        negative.parts[..self.len].iter_mut().for_each(|x| *x = -*x);
+        negative
     }
 
     /// `self * factor`. `S` is at least `2 N`.
     ///
     /// Source: Shewchuk 1997, figure 13's companion, scale expansion with zero elimination.
+    #[inline(always)]
     pub fn scaled<const S: usize>(&self, factor: f64) -> Expansion<S> {
         const { assert!(S >= 2 * N) };
         let mut product = Expansion::<S>::ZERO;
-        let parts = &self.parts[..self.len];
-        let Some((&first, rest)) = parts.split_first() else { return product };
-        let (mut total, e) = two_product(first, factor);
-        product.push(e);
-        for &x in rest {
-            let (hi, lo) = two_product(x, factor);
-            let (t, e) = two_sum(total, lo);
-            product.push(e);
-            let (t, e) = two_sum(hi, t);
-            product.push(e);
-            total = t;
-        }
-        product.push(total);
+        product.scale(&self.parts[..self.len], factor);
         product
     }
 
+    /// Becomes `parts * factor`, from zero. The capacity must hold the result.
+    #[inline(never)]
+    fn scale(&mut self, parts: &[f64], factor: f64) {
+        let Some((&first, rest)) = parts.split_first() else { return };
+        let (mut total, e) = two_product(first, factor);
+        self.push(e);
+        for &x in rest {
+            let (hi, lo) = two_product(x, factor);
+            let (t, e) = two_sum(total, lo);
+            self.push(e);
+            let (t, e) = two_sum(hi, t);
+            self.push(e);
+            total = t;
+        }
+        self.push(total);
+    }
+
     /// `self * other`, by distributing over the components of `other`. `S` is at least `2 N M`.
+    #[inline(always)]
     pub fn times<const M: usize, const S: usize>(&self, other: &Expansion<M>) -> Expansion<S> {
         const { assert!(S >= 2 * N * M) };
         let mut product = Expansion::<S>::ZERO;

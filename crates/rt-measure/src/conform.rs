@@ -375,9 +375,12 @@ impl<S: Structure> Trial<'_, S> {
     }
 }
 
+/// How many hits are asked for again, with intervals that end at them, just before and just after.
+const ENDS: usize = 40;
+
 /// What [`Exhaustive`] answers, as text.
 struct Truth<R: Real> {
-    /// The rays of a trial first, then the first hundred hits once more from and to their ends.
+    /// The rays of a trial first, then the first [`ENDS`] hits once more from and to their ends.
     asked: Vec<Ray<R>>,
     /// The closest hit of each.
     closest: Vec<String>,
@@ -391,7 +394,7 @@ impl<R: Real> Truth<R> {
         G::At: fmt::Debug,
     {
         let mut asked = rays.to_vec();
-        for (ray, hit) in rays.iter().filter_map(|ray| Some((ray, exhaustive.intersect(ray)?))).take(100) {
+        for (ray, hit) in rays.iter().filter_map(|ray| Some((ray, exhaustive.intersect(ray)?))).take(ENDS) {
             let (t, before, after) = (hit.t, hit.t.next_down(), hit.t.next_up());
             let ends = [(t, t), (ray.t_min, t), (t, ray.t_max), (ray.t_min, before), (after, ray.t_max)];
             asked.extend(ends.map(|(t_min, t_max)| ray.between(t_min, t_max)));

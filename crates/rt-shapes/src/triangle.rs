@@ -254,9 +254,9 @@ impl Triangle {
         let [v0, v1, v2] = self.corners;
         let (a, e1, e2) = (exact_minus(v0, o), exact_minus(v1, v0), exact_minus(v2, v0));
         let n = exact_cross(&e1, &e2);
-        let products: [Expansion<64>; 3] = [0, 1, 2].map(|i| n[i].times(&a[i]));
-        let above: Expansion<128> = products[0].plus(&products[1]);
-        let above: Expansion<192> = above.plus(&products[2]);
+        let product = |i: usize| -> Expansion<64> { n[i].times(&a[i]) };
+        let above: Expansion<128> = product(0).plus(&product(1));
+        let above: Expansion<192> = above.plus(&product(2));
         let along = exact_dot(&n, d);
         // The sign of the distance less `x + y`.
         let beyond = |x: f64, y: f64| {
@@ -304,17 +304,17 @@ fn exact_minus(p: DVec3, q: DVec3) -> [Expansion<2>; 3] {
 }
 
 pub(crate) fn exact_cross(p: &[Expansion<2>; 3], q: &[Expansion<2>; 3]) -> [Expansion<16>; 3] {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
-        let left: Expansion<8> = p[i].times(&q[j]);
-        let right: Expansion<8> = p[j].times(&q[i]);
+    let minor = |i: usize, j: usize| -> Expansion<16> {
+        let (left, right): (Expansion<8>, Expansion<8>) = (p[i].times(&q[j]), p[j].times(&q[i]));
         left.minus(&right)
-    })
+    };
+    [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
 fn exact_dot(p: &[Expansion<16>; 3], d: DVec3) -> Expansion<96> {
-    let terms: [Expansion<32>; 3] = [0, 1, 2].map(|i| p[i].scaled(d[i]));
-    let sum: Expansion<64> = terms[0].plus(&terms[1]);
-    sum.plus(&terms[2])
+    let term = |i: usize| -> Expansion<32> { p[i].scaled(d[i]) };
+    let sum: Expansion<64> = term(0).plus(&term(1));
+    sum.plus(&term(2))
 }
 
 /// `det [d, p - o, q - o]`, exactly.
@@ -326,14 +326,14 @@ fn edge_volume(o: DVec3, d: DVec3, p: DVec3, q: DVec3) -> Expansion<96> {
         (0..3).all(|i| two_sum(v[i], -o[i]).1 == 0.0 && difference[i].is_finite())
     };
     if exact(p, a) && exact(q, b) {
-        let terms = [(1, 2, 0), (2, 0, 1), (0, 1, 2)].map(|(i, j, k)| {
+        let term = |i: usize, j: usize, k: usize| -> Expansion<8> {
             let left: Expansion<2> = Expansion::<1>::new(a[i]).scaled(b[j]);
             let right: Expansion<2> = Expansion::<1>::new(a[j]).scaled(b[i]);
             let minor: Expansion<4> = left.minus(&right);
-            minor.scaled::<8>(d[k])
-        });
-        let sum: Expansion<16> = terms[0].plus(&terms[1]);
-        return sum.plus(&terms[2]);
+            minor.scaled(d[k])
+        };
+        let sum: Expansion<16> = term(1, 2, 0).plus(&term(2, 0, 1));
+        return sum.plus(&term(0, 1, 2));
     }
     exact_dot(&exact_cross(&exact_minus(p, o), &exact_minus(q, o)), d)
 }
