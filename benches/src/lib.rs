@@ -6,6 +6,9 @@
 //! | [`Question::Any`] | the same of any hit, for short rays and for rays to a light |
 //! | [`Question::Build`] | what does each knob of [`BvhParams`](rt_bvh::BvhParams) buy, in build time and in time a ray? |
 //! | [`Question::Precision`] | what does the fast triangle test gain, and what does it get wrong? |
+//! | [`Question::Structures`] | which structure for which scene? |
+//! | [`Question::Subdivision`] | how finely should a grid divide space? |
+//! | [`Question::Scaling`] | how does the cost of a ray grow with the number of primitives? |
 //! | [`Question::Slab`] | which box test? |
 //! | [`Question::Volumes`] | which bounding volume, and when does it pay? |
 //! | [`Question::Shapes`] | what do smooth shapes cost, met directly and as triangles, and how far off are those? |
@@ -57,6 +60,7 @@
 
 mod contest;
 mod fast;
+mod field;
 mod fractals;
 mod judge;
 mod knobs;
@@ -65,9 +69,13 @@ mod patches;
 mod queries;
 #[cfg(feature = "rivals")]
 mod rivals;
+pub mod roster;
+mod scaling;
+mod schemes;
 mod shapes;
 mod slab;
 mod space;
+mod subdivision;
 mod subject;
 mod volumes;
 
@@ -95,6 +103,12 @@ pub enum Question {
     Build,
     /// What does the fast triangle test gain and lose?
     Precision,
+    /// Which structure for which scene?
+    Structures,
+    /// How finely should a grid divide space?
+    Subdivision,
+    /// How does the cost of a ray grow with the number of primitives?
+    Scaling,
     /// Which box test?
     Slab,
     /// Which bounding volume, and when does it pay?
@@ -109,11 +123,14 @@ pub enum Question {
 
 impl Question {
     /// All questions.
-    pub const ALL: [Question; 9] = [
+    pub const ALL: [Question; 12] = [
         Question::Closest,
         Question::Any,
         Question::Build,
         Question::Precision,
+        Question::Structures,
+        Question::Subdivision,
+        Question::Scaling,
         Question::Slab,
         Question::Volumes,
         Question::Shapes,
@@ -128,6 +145,9 @@ impl Question {
             Question::Any => "any",
             Question::Build => "build",
             Question::Precision => "precision",
+            Question::Structures => "structures",
+            Question::Subdivision => "subdivision",
+            Question::Scaling => "scaling",
             Question::Slab => "slab",
             Question::Volumes => "volumes",
             Question::Shapes => "shapes",
@@ -143,6 +163,9 @@ impl Question {
             (Question::Any, Effort::Quick) => 14,
             (Question::Build, Effort::Quick) => 30,
             (Question::Precision, Effort::Quick) => 12,
+            (Question::Structures, Effort::Quick) => 60,
+            (Question::Subdivision, Effort::Quick) => 30,
+            (Question::Scaling, Effort::Quick) => 30,
             (Question::Slab, _) => 2,
             (Question::Volumes, Effort::Quick) => 30,
             (Question::Shapes, Effort::Quick) => 15,
@@ -152,6 +175,9 @@ impl Question {
             (Question::Any, Effort::Normal) => 60,
             (Question::Build, Effort::Normal) => 170,
             (Question::Precision, Effort::Normal) => 40,
+            (Question::Structures, Effort::Normal) => 300,
+            (Question::Subdivision, Effort::Normal) => 120,
+            (Question::Scaling, Effort::Normal) => 300,
             (Question::Volumes, Effort::Normal) => 150,
             (Question::Shapes, Effort::Normal) => 60,
             (Question::Lazy, Effort::Normal) => 60,
@@ -160,6 +186,9 @@ impl Question {
             (Question::Any, Effort::Full) => 240,
             (Question::Build, Effort::Full) => 600,
             (Question::Precision, Effort::Full) => 90,
+            (Question::Structures, Effort::Full) => 600,
+            (Question::Subdivision, Effort::Full) => 300,
+            (Question::Scaling, Effort::Full) => 3000,
             (Question::Volumes, Effort::Full) => 600,
             (Question::Shapes, Effort::Full) => 180,
             (Question::Lazy, Effort::Full) => 120,
@@ -287,6 +316,9 @@ pub fn ask(question: Question, options: &Options, watch: Watch<'_>) -> Result<Ve
     match question {
         Question::Closest | Question::Any | Question::Precision => queries::ask(question, options, watch),
         Question::Build => knobs::ask(options, watch),
+        Question::Structures => schemes::ask(options, watch),
+        Question::Subdivision => subdivision::ask(options, watch),
+        Question::Scaling => scaling::ask(options, watch),
         Question::Slab => slab::ask(options.effort, watch),
         Question::Volumes => volumes::ask(options.effort, watch),
         Question::Shapes => {

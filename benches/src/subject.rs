@@ -59,10 +59,7 @@ impl Subject {
         if name == "blob" {
             return Ok(Subject::blob());
         }
-        let (scene, size) = match name.rsplit_once('-').map(|(scene, size)| (scene, size.parse::<u32>())) {
-            Some((scene, Ok(size))) => (scene, Some(size)),
-            _ => (name, None),
-        };
+        let (scene, size) = split_size(name);
         let made = rt_scenes::by_name(scene, size).map_err(|error| {
             Trouble::Scene(match error {
                 SceneError::Unknown { .. } => format!("{error}, blob"),
@@ -180,6 +177,14 @@ impl Subject {
             width: side,
             height: side,
         })
+    }
+}
+
+/// A scene's name and the size behind its hyphen.
+pub(crate) fn split_size(name: &str) -> (&str, Option<u32>) {
+    match name.rsplit_once('-').map(|(scene, size)| (scene, size.parse::<u32>())) {
+        Some((scene, Ok(size))) => (scene, Some(size)),
+        _ => (name, None),
     }
 }
 

@@ -70,6 +70,12 @@ enum Asked {
     Build,
     /// What does the fast triangle test gain and lose?
     Precision,
+    /// Which structure for which scene?
+    Structures,
+    /// How finely should a grid divide space?
+    Subdivision,
+    /// How does the cost of a ray grow with the number of primitives?
+    Scaling,
     /// Which box test?
     Slab,
     /// Which bounding volume, and when does it pay?
@@ -89,6 +95,9 @@ impl Asked {
             Asked::Any => Question::Any,
             Asked::Build => Question::Build,
             Asked::Precision => Question::Precision,
+            Asked::Structures => Question::Structures,
+            Asked::Subdivision => Question::Subdivision,
+            Asked::Scaling => Question::Scaling,
             Asked::Slab => Question::Slab,
             Asked::Volumes => Question::Volumes,
             Asked::Shapes => Question::Shapes,

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::output::{root, say, write_whole};
 use crate::stage::{Precision, Stage, load};
-use crate::structures;
+use rt_bench::roster;
 use rt_render::{Camera, Film, Picture, ungoverned};
 use rt_scenes::{Scene, SceneGeometry};
 use std::path::{Path, PathBuf};
@@ -61,10 +61,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
     }
     let one = args.with.as_deref();
-    let all = structures::NAMES.iter().copied().filter(|name| one.is_none_or(|only| only == *name));
+    let all = roster::NAMES.iter().copied().filter(|name| one.is_none_or(|only| only == *name));
     let chosen: Vec<&str> = all.collect();
     if chosen.is_empty() {
-        let known = structures::NAMES.join(", ");
+        let known = roster::NAMES.join(", ");
         return Err(Failure::Usage(format!(
             "there is no structure {:?}; there are {known}",
             one.unwrap_or("")
@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn pictures_have_not_changed() {
         for name in ["balls", "tetra"] {
-            for structure in structures::NAMES {
+            for structure in roster::NAMES {
                 assert_eq!(
                     compare(name, structure, &root().join("assets/golden")).unwrap(),
                     None,

@@ -15,7 +15,7 @@ mod render;
 mod spd;
 mod stability;
 mod stage;
-mod structures;
+
 mod tidy;
 
 use clap::{Parser, Subcommand};

@@ -3,9 +3,9 @@
 use crate::failure::Failure;
 use crate::output::{Json, Progress, catch_interrupts, interrupted, say, thousands, write_whole};
 use crate::stage::{Bits, Built, Precision, Stage, load};
-use crate::structures;
 use clap::ValueEnum;
 use rt_accel::{Counts, Member};
+use rt_bench::roster;
 use rt_geom::Real;
 use rt_render::{Camera, Film, Look, Measure, Picture, Plan, RayCounts, Scale, Whitted, heat};
 use rt_scenes::{Scene, SceneGeometry};
@@ -59,7 +59,7 @@ pub(crate) struct Args {
     format: Format,
 }
 
-const DEFAULT_STRUCTURE: &str = structures::NAMES[0];
+const DEFAULT_STRUCTURE: &str = roster::NAMES[0];
 
 const EXAMPLES: &str = "\
 Examples:
@@ -102,8 +102,8 @@ struct Facts {
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    if !structures::NAMES.contains(&args.with.as_str()) {
-        let known = structures::NAMES.join(", ");
+    if !roster::NAMES.contains(&args.with.as_str()) {
+        let known = roster::NAMES.join(", ");
         return Err(Failure::Usage(format!("there is no structure {:?}; there are {known}", args.with)));
     }
     let output = target(args)?;

@@ -3,8 +3,8 @@
 use crate::failure::Failure;
 use crate::output::{Progress, catch_interrupts, say, thousands};
 use crate::stage::{Bits, Precision, Stage, load};
-use crate::structures;
 use rt_accel::Member;
+use rt_bench::roster;
 use rt_geom::Real;
 use rt_render::{Camera, Film, Look, RayCounts, Whitted};
 use rt_scenes::spd::{KNOWN, Known};
@@ -22,7 +22,7 @@ pub(crate) struct Args {
     #[arg(value_name = "SCENE")]
     scenes: Vec<String>,
     /// The structure over the scenes.
-    #[arg(long, value_name = "STRUCTURE", default_value = structures::NAMES[0])]
+    #[arg(long, value_name = "STRUCTURE", default_value = roster::NAMES[0])]
     with: String,
     /// Precision of the rays.
     #[arg(long, value_enum, default_value_t = Bits::F64)]

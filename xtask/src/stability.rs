@@ -2,9 +2,9 @@
 
 use crate::failure::Failure;
 use crate::output::{Json, Progress, catch_interrupts, interrupted, say, thousands};
-use crate::structures::{self, Job};
 use rayon::prelude::*;
 use rt_accel::{Aggregate, Bounded, Geometry, Primitive, Structure};
+use rt_bench::roster::{self, Job};
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real, Vector};
@@ -168,7 +168,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             .par_iter()
             .map(|case| match interrupted() {
                 true => Ok(Default::default()),
-                false => structures::with(&args.with, Ask { case, seed }),
+                false => roster::with(&args.with, Ask { case, seed }),
             })
             .collect::<Result<_, _>>()
             .map_err(Failure::Usage)?;
@@ -493,7 +493,7 @@ mod tests {
             // Exhaustive search of large meshes takes long, and is asked by every conformance test already.
             let large = matches!(&case.mesh, Mesh::Single(mesh) if mesh.triangles().len() > 100);
             for structure in if large { &["bvh"][..] } else { &["bvh", "exhaustive"] } {
-                let tallies = structures::with(structure, Ask { case, seed: 12 }).unwrap();
+                let tallies = roster::with(structure, Ask { case, seed: 12 }).unwrap();
                 for tally in tallies {
                     let HitError { missed, invented, wrong, t_ulp, .. } = tally.hits;
                     assert!(

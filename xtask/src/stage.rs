@@ -1,8 +1,8 @@
 //! [`Stage`]: a scene under a structure, ready for rays of one precision.
 
 use crate::failure::Failure;
-use crate::structures::{self, Job};
 use rt_accel::{Aggregate, Bounded, BuildError, Member, Structure};
+use rt_bench::roster::{self, Job};
 use rt_geom::Real;
 use rt_scenes::{Scene, SceneGeometry};
 use rt_shapes::{Shape, Surfaced, Uv};
@@ -108,7 +108,7 @@ fn build<R: Real, G: Surfaced<R> + Bounded + 'static>(
     structure: &str,
     watch: &mut dyn FnMut(f32) -> ControlFlow<()>,
 ) -> Result<(AnyShape<R, G::At>, Built), Failure> {
-    match structures::with(structure, Build { geometry, watch, precision: std::marker::PhantomData }) {
+    match roster::with(structure, Build { geometry, watch, precision: std::marker::PhantomData }) {
         Ok(Ok(built)) => Ok(built),
         Ok(Err(BuildError::Cancelled)) => Err(Failure::Interrupted),
         Ok(Err(error)) => Err(Failure::Check(format!("{structure}: {error}"))),

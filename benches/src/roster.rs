@@ -6,7 +6,7 @@ use rt_grid::{Grid, GridParams};
 use rt_kdtree::{KdTree, KdTreeParams};
 
 /// Something to be done with a structure whose name was given.
-pub(crate) trait Job {
+pub trait Job {
     /// What comes of it.
     type Out;
     /// Does it, with the parameters that the name stands for.
@@ -16,10 +16,10 @@ pub(crate) trait Job {
 macro_rules! structures {
     ($($name:literal => $structure:ty: $params:expr),* $(,)?) => {
         /// All names.
-        pub(crate) const NAMES: &[&str] = &[$($name),*];
+        pub const NAMES: &[&str] = &[$($name),*];
 
         /// Does `job` with the structure called `name`; without such a structure, says which there are.
-        pub(crate) fn with<J: Job>(name: &str, job: J) -> Result<J::Out, String> {
+        pub fn with<J: Job>(name: &str, job: J) -> Result<J::Out, String> {
             match name {
                 $($name => Ok(job.run::<$structure>(&$params)),)*
                 _ => Err(format!("there is no structure {name:?}; there are {}", NAMES.join(", "))),
