@@ -406,6 +406,7 @@ impl<'a> Spot<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Camera, Film, ungoverned};
     use rt_accel::{Aggregate, Exhaustive, Member};
     use rt_shapes::{Sphere, Uv};
 
@@ -534,5 +535,29 @@ mod tests {
         let ray = Ray::new(DVec3::new(-5.0, 0.1, 0.0), DVec3::X);
         let (colors, _) = whitted.colors(vec![ray, Ray { dir: DVec3::NAN, ..ray }]);
         assert_eq!(colors[1], [0.25, 0.5, 0.75]);
+    }
+
+    /// Spheres that cross at such small angles that many are met at one distance in f32: a ray that left the one of the lowest
+    /// number would begin inside another.
+    #[test]
+    fn what_the_eye_sees_is_lit_from_the_eye() {
+        for distance in [4.0, 64.0, 8192.0] {
+            let ball = |i: i32| Sphere::new(DVec3::X * (f64::from(i) * 1e-3), 1.0).unwrap();
+            let row = Balls::build((0..40).map(ball).collect(), &()).unwrap();
+            let from = DVec3::new(-0.625, 0.5, 0.625) * distance;
+            let lights = [Light { position: from, color: [1.0; 3] }];
+            let look = Look { materials: &[], lights: &lights, background: [0.0; 3] };
+            let whitted = Whitted::new(&row, |_: &Member<Uv>| 0, look);
+            let view = rt_scenes::View { from, at: DVec3::ZERO, up: DVec3::Z, angle: 2.4 / distance };
+            let camera = Camera::new(&view).unwrap();
+            let film = Film::new(64, 64);
+            let counts = [
+                film.render::<f32, _, _>(&camera, &whitted, &ungoverned).unwrap().1,
+                film.render::<f64, _, _>(&camera, &whitted, &ungoverned).unwrap().1,
+            ];
+            for counts in counts {
+                assert!(counts.shadow > 1000 && counts.occluded == 0, "{distance}: {counts:?}");
+            }
+        }
     }
 }
