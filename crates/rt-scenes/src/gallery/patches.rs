@@ -33,7 +33,7 @@ pub fn patches(size: u32) -> Result<Scene, SceneError> {
         let turned = if n == 1 { 0.0 } else { f64::from(k) * 0.381_966 };
         let to = place(turned, 0.0, scale, if n == 1 { DVec3::ZERO } else { to });
         for patch in &pot {
-            pile.push(Placed::new("a Bézier patch", Arc::clone(patch), to.clone()), k % 5);
+            pile.push(Placed::new("a Bézier patch", Arc::clone(patch), to), k % 5);
         }
     }
     for k in 0..144 {
@@ -61,7 +61,7 @@ pub fn patches(size: u32) -> Result<Scene, SceneError> {
 fn cloth(i: u32, j: u32) -> DVec3 {
     let at = |i: u32| 13.0 * (f64::from(i) / 12.0 - 0.5);
     let (x, y) = (at(i), at(j));
-    let far = ((x * x + y * y).sqrt() - 2.6).max(0.0).min(2.0);
+    let far = ((x * x + y * y).sqrt() - 2.6).clamp(0.0, 2.0);
     let wave = turns(0.19 * x + 0.11 * y).0 + turns(0.07 * x - 0.23 * y + 0.2).0;
     DVec3::new(x, y, 0.16 * far * wave)
 }
