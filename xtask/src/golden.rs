@@ -44,6 +44,8 @@ fn size(scene: &str) -> Option<u32> {
         "interior" => Some(1),
         "terrain" => Some(40),
         "stadium" => Some(2),
+        "loop" => Some(2),
+        "mountains" => Some(6),
         "soup" | "clusters" | "sticks" | "needles" | "rubble" => Some(1000),
         "icosphere" | "crumpled" => Some(3),
         "torus" => Some(20),

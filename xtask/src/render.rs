@@ -19,9 +19,9 @@ use std::time::{Duration, Instant};
 ///
 /// Without arguments: the sphereflake, in out/balls.png.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = format!("{EXAMPLES}\n\n{}", scenes()))]
 pub(crate) struct Args {
-    /// The scene: a name, or a file that ends in .obj or .nff.
+    /// The scene: a name, of those below, or a file that ends in .obj or .nff.
     #[arg(default_value = "balls", value_name = "SCENE|FILE")]
     scene: String,
     /// The structure over the scene.
@@ -45,7 +45,7 @@ pub(crate) struct Args {
     /// Say what the scene left out.
     #[arg(long)]
     explain: bool,
-    /// Size of a generated scene, in its own terms.
+    /// Size of a generated scene, in its own terms: instead of the number in its description.
     #[arg(long, value_name = "N")]
     spd_size: Option<u32>,
     /// Overwrite the file given with -o.
@@ -68,6 +68,13 @@ Examples:
   cargo xtask render bunny.obj -o bunny.png --force  a mesh, over an older picture
   cargo xtask render balls --heat nodes              what each eye ray costs
   cargo xtask render --precision f64 --format json   figures for a program";
+
+/// The scenes, a line each.
+fn scenes() -> String {
+    let line = |name: &&str| format!("  {name:10} {}", rt_scenes::about(name).unwrap_or_default());
+    let lines: Vec<String> = rt_scenes::names().iter().map(line).collect();
+    format!("Scenes:\n{}", lines.join("\n"))
+}
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Heat {
@@ -205,6 +212,13 @@ fn picture<R: Real, P: Shape<R> + ?Sized>(
     let whitted = Whitted::new(shape, material_of, look);
     let camera = Camera::new(&scene.view).map_err(|e| Failure::File(format!("{}: {e}", args.scene)))?;
     let film = Film::new(args.size, args.size);
+    if !camera.corner::<R>([0, 0], [args.size; 2]).is_valid() {
+        let from = scene.view.from;
+        return Err(Failure::File(format!(
+            "{}: no ray of this precision begins at the eye, {from:?}",
+            args.scene
+        )));
+    }
     let stopped = |_| Failure::Interrupted;
 
     let progress = Progress::new("rendering", args.quiet);

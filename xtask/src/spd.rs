@@ -40,7 +40,7 @@ Examples:
 
 A count of rays shot is off where it is more than half a percent from the recomputed one, or a tenth from Haines'; one of rays
 that hit, where it is more than two percent off. Those of the teapot differ because its mirrored rays follow its smooth normals,
-and those recomputed follow its triangles. Rays of f32 hit too much in shells, whose spheres cross at small angles.";
+and those recomputed follow its triangles.";
 
 /// What is counted, in the order of [`Known::rays`].
 const COLUMNS: [&str; 7] =

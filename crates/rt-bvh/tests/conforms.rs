@@ -1,6 +1,6 @@
 //! The tree answers as every primitive in turn does, bit for bit: closest, any, all, many; in both precisions.
 
-use rt_accel::Instance;
+use rt_accel::{Instance, WorldBound};
 use rt_bvh::{Builder, Bvh, BvhParams};
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real, Transform};
@@ -44,7 +44,9 @@ fn on_every_trial_in_f64() {
 
 #[test]
 fn on_solids_of_every_kind() {
-    for (name, size) in [("balls", 2), ("rings", 1), ("tree", 4), ("mount", 2), ("teapot", 1)] {
+    let plain = [("balls", 2), ("rings", 1), ("tree", 4), ("mount", 2), ("teapot", 1)];
+    let placed = [("patches", 1), ("quadrics", 9), ("loop", 0), ("mountains", 4)];
+    for (name, size) in plain.into_iter().chain(placed) {
         let scene = rt_scenes::by_name(name, Some(size)).unwrap();
         let SceneGeometry::Solids(solids) = scene.geometry else { panic!("{name} are solids") };
         let points: Vec<DVec3> = solids
@@ -53,6 +55,7 @@ fn on_solids_of_every_kind() {
                 Solid::Sphere(ball) => Some(ball.center() + DVec3::X * ball.radius()),
                 Solid::Frustum(frustum) => Some(frustum.ends()[0]),
                 Solid::Facet(facet) => Some(facet.corners()[0]),
+                Solid::Placed(placed) => Some(placed.shape().world_bound().max.as_dvec3()),
                 _ => None,
             })
             .collect();

@@ -65,6 +65,12 @@ impl fmt::Display for CameraError {
 
 impl core::error::Error for CameraError {}
 
+/// The direction of a vector of any finite length.
+fn unit(v: DVec3) -> Option<DVec3> {
+    // Of size 1 first, so that squares neither vanish nor overflow. One over a subnormal may be infinite; a quotient is not.
+    (v / v.abs().max_element()).try_normalize()
+}
+
 impl Camera {
     /// The camera of a view.
     ///
@@ -78,8 +84,10 @@ impl Camera {
         if !(view.angle > 0.0 && view.angle < std::f64::consts::PI) {
             return Err(CameraError::Angle(view.angle));
         }
-        let forward = (view.at - view.from).try_normalize().ok_or(CameraError::NoDirection)?;
-        let up = view.up.try_normalize().ok_or(CameraError::NoUp)?;
+        let way = view.at - view.from;
+        let way = if way.is_finite() { way } else { view.at * 0.5 - view.from * 0.5 };
+        let forward = unit(way).ok_or(CameraError::NoDirection)?;
+        let up = unit(view.up).ok_or(CameraError::NoUp)?;
         let right = forward.cross(up);
         // Nearly parallel: what is left of the cross product is rounding.
         if right.length() < 1e-12 {
@@ -117,6 +125,17 @@ mod tests {
             let bottom = camera.corner::<f64>([middle[0], size], [middle[1], size]);
             assert!((top.dir.angle_between(bottom.dir) - view().angle).abs() < 1e-12);
             assert!(top.dir.z > bottom.dir.z);
+        }
+    }
+
+    #[test]
+    fn views_of_any_size_have_directions() {
+        let near = Camera::new(&view()).unwrap();
+        for size in [5e-324, 1e-310, 1e-200, 1e154, 1e300, 1.7e308] {
+            let (from, at) = (DVec3::new(0.0, -size, 0.0), DVec3::new(0.0, size, 0.0));
+            let camera = Camera::new(&View { from, at, up: DVec3::Z * size, ..view() }).unwrap();
+            assert_eq!(camera.corner::<f64>([1, 1], [2, 2]).dir, DVec3::Y, "{size:e}");
+            assert_eq!(camera.right.length(), near.right.length());
         }
     }
 

@@ -266,7 +266,8 @@ impl<'a, P: ?Sized, M> Whitted<'a, P, M> {
                 }
                 let surface = self.shape.surface(ray, hit);
                 let number = (self.material_of)(&hit.at) as usize;
-                let spot = Spot::new(ray, surface, self.look.materials.get(number).unwrap_or(&self.plain));
+                let material = self.look.materials.get(number).unwrap_or(&self.plain);
+                let spot = Spot::new(ray, hit.t, surface, material);
                 colors[path.sample as usize] += spot.ambient() * (path.weight * self.ambient);
                 if self.plan.shadow {
                     self.lights(&spot, path, &mut shadow);
@@ -299,12 +300,12 @@ impl<'a, P: ?Sized, M> Whitted<'a, P, M> {
     /// Shadow rays, with what they bring if they arrive.
     fn lights<R: Real>(&self, spot: &Spot<'_>, path: &Path, shadow: &mut Wave<R, Gleam>) {
         for light in self.look.lights {
-            let to_light = light.position - spot.surface.point;
+            let to_light = light.position - spot.before.point;
             // Also false for a light that is not a number.
             if to_light.dot(spot.normal) > 0.0 {
                 let brought = spot.lit_from(to_light.normalize_or_zero());
                 let color = brought * Vec3::from(light.color) * path.weight;
-                shadow.push(spot.surface.spawn_to(light.position), Gleam { sample: path.sample, color });
+                shadow.push(spot.before.spawn_to(light.position), Gleam { sample: path.sample, color });
             }
         }
     }
@@ -323,7 +324,7 @@ impl<'a, P: ?Sized, M> Whitted<'a, P, M> {
         }
         if self.plan.reflection && reflects(material) {
             counts.reflection += 1;
-            let ray = spot.surface.spawn(R::Vec3::nearest(spot.mirrored));
+            let ray = spot.before.spawn(R::Vec3::nearest(spot.mirrored));
             next.push(ray, Path { weight: path.weight * mirrored, ..*path });
         }
         if let Some(dir) = through {
@@ -337,6 +338,12 @@ impl<'a, P: ?Sized, M> Whitted<'a, P, M> {
 /// A hit, ready to be shaded.
 struct Spot<'a> {
     surface: Surface,
+    /// The surface as rays leave it that stay on this side: a unit in the last place of `t` before the hit.
+    ///
+    /// Surfaces that the ray meets at distances which round to the same `t` are not told apart by it: the one that was hit, by its
+    /// lower number, may lie up to half a unit behind the exact hit of another, and a ray that left the surface itself would begin
+    /// behind that other one. Before this place there is nothing: there would have been a closer hit.
+    before: Surface,
     material: &'a Material,
     /// The ray's unit direction.
     dir: DVec3,
@@ -348,8 +355,13 @@ struct Spot<'a> {
     mirrored: DVec3,
 }
 
+/// A unit in the last place.
+fn unit<R: Real>(t: R) -> f64 {
+    t.next_up().into() - t.into()
+}
+
 impl<'a> Spot<'a> {
-    fn new<R: Real>(ray: &Ray<R>, surface: Surface, material: &'a Material) -> Spot<'a> {
+    fn new<R: Real>(ray: &Ray<R>, t: R, surface: Surface, material: &'a Material) -> Spot<'a> {
         let dir = ray.dir.widen().normalize_or_zero();
         let against = |n: DVec3, side: bool| if side { -n } else { n };
         let inside = dir.dot(surface.normal) > 0.0;
@@ -357,7 +369,9 @@ impl<'a> Spot<'a> {
         let mirror = |n: DVec3| dir - n * (2.0 * dir.dot(n));
         let smooth = mirror(shading);
         let mirrored = if smooth.dot(normal) > 0.0 { smooth } else { mirror(normal) };
-        Spot { surface, material, dir, normal, shading, mirrored }
+        let point = surface.point - ray.dir.widen() * unit(t);
+        let before = if point.is_finite() { Surface { point, ..surface } } else { surface };
+        Spot { surface, before, material, dir, normal, shading, mirrored }
     }
 
     fn ambient(&self) -> Vec3 {
@@ -392,6 +406,7 @@ impl<'a> Spot<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Camera, Film, ungoverned};
     use rt_accel::{Aggregate, Exhaustive, Member};
     use rt_shapes::{Sphere, Uv};
 
@@ -520,5 +535,29 @@ mod tests {
         let ray = Ray::new(DVec3::new(-5.0, 0.1, 0.0), DVec3::X);
         let (colors, _) = whitted.colors(vec![ray, Ray { dir: DVec3::NAN, ..ray }]);
         assert_eq!(colors[1], [0.25, 0.5, 0.75]);
+    }
+
+    /// Spheres that cross at such small angles that many are met at one distance in f32: a ray that left the one of the lowest
+    /// number would begin inside another.
+    #[test]
+    fn what_the_eye_sees_is_lit_from_the_eye() {
+        for distance in [4.0, 64.0, 8192.0] {
+            let ball = |i: i32| Sphere::new(DVec3::X * (f64::from(i) * 1e-3), 1.0).unwrap();
+            let row = Balls::build((0..40).map(ball).collect(), &()).unwrap();
+            let from = DVec3::new(-0.625, 0.5, 0.625) * distance;
+            let lights = [Light { position: from, color: [1.0; 3] }];
+            let look = Look { materials: &[], lights: &lights, background: [0.0; 3] };
+            let whitted = Whitted::new(&row, |_: &Member<Uv>| 0, look);
+            let view = rt_scenes::View { from, at: DVec3::ZERO, up: DVec3::Z, angle: 2.4 / distance };
+            let camera = Camera::new(&view).unwrap();
+            let film = Film::new(64, 64);
+            let counts = [
+                film.render::<f32, _, _>(&camera, &whitted, &ungoverned).unwrap().1,
+                film.render::<f64, _, _>(&camera, &whitted, &ungoverned).unwrap().1,
+            ];
+            for counts in counts {
+                assert!(counts.shadow > 1000 && counts.occluded == 0, "{distance}: {counts:?}");
+            }
+        }
     }
 }

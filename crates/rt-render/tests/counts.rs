@@ -92,7 +92,8 @@ fn cylinders_and_cones_take_the_rays_they_are_known_for() {
 #[test]
 fn the_others_take_the_rays_they_are_known_for() {
     agree::<f64>("tetra", 5);
-    agree::<f64>("shells", 5);
+    // Whose spheres cross at such small angles that many are met at one distance in f32.
+    agree::<f32>("shells", 5);
     agree::<f64>("sombrero", 1);
 }
 
@@ -101,10 +102,6 @@ fn the_others_take_the_rays_they_are_known_for() {
 fn all_scenes_in_all_sizes_take_the_rays_they_are_known_for() {
     for known in KNOWN {
         agree::<f64>(known.scene, known.size);
-        // Spheres of shells cross at small angles: the origin of a ray, rounded to f32, is then inside the next one, which brings
-        // a few hundred hits too many.
-        if known.scene != "shells" {
-            agree::<f32>(known.scene, known.size);
-        }
+        agree::<f32>(known.scene, known.size);
     }
 }

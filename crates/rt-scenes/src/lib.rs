@@ -1,5 +1,5 @@
 //! Scenes to try ray tracing on: Haines' Standard Procedural Databases, NFF and OBJ files, random soups, a teapot in a
-//! stadium, an interior, a terrain, and inputs meant to hurt.
+//! stadium, an interior, a terrain, a gallery of curved shapes, and inputs meant to hurt.
 //!
 //! * A [`Scene`] is what a picture needs: shapes, looks, lights, a view. [`by_name`] makes one of [`names`]; [`obj::load`] and
 //!   [`nff::load`] read one.
@@ -17,9 +17,11 @@
 //! # Invariants
 //!
 //! A scene depends on its name and numbers alone, to the last bit, on every machine: generators use only operations that
-//! IEEE 754 rounds correctly, and random numbers of their own. Nothing here prints, or panics on any input or file.
+//! IEEE 754 rounds correctly, and random numbers of their own. (Shapes of the [`gallery`] hold sines and powers as the platform
+//! rounds them.) Nothing here prints, or panics on any input or file.
 
 pub mod fine;
+pub mod gallery;
 pub mod hostile;
 pub mod interior;
 pub mod nff;
@@ -31,12 +33,14 @@ pub mod terrain;
 
 mod facet;
 mod numbers;
+mod placed;
 mod scene;
 mod solid;
 mod teapot;
 mod trial;
 
 pub use facet::Facet;
-pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, by_name, names};
+pub use placed::Placed;
+pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, about, by_name, names};
 pub use solid::Solid;
 pub use trial::{Closed, Trial, closed_meshes, fine_trials, trials};

@@ -10,6 +10,7 @@
 //! | `p` and `pp` of three corners | a triangle |
 //! | `p` of more corners | a polygon |
 //! | `pp` of more corners | cut into triangles |
+//! | a view from a point to itself, or farther than `1e154` | an error |
 //! | corners without area | triangles that are never hit, with a warning |
 //! | words and numbers that are none, files that end too soon | an error |
 //!
@@ -19,7 +20,7 @@
 //!
 //! Numbers are written with as many digits as bring them back. So what is written and read again is the same, primitive for
 //! primitive, with the same looks; materials may be numbered otherwise, texture coordinates are lost, and a mesh of `f64` that
-//! `f32` tells apart comes back in `f32`.
+//! `f32` tells apart comes back in `f32`. [Placed](crate::Solid::Placed) shapes, of which the format has no words, are an error.
 //!
 //! ```
 //! use rt_scenes::nff;
@@ -94,6 +95,13 @@ pub enum NffProblem {
     Corners(String),
     /// A field of view that is not above 0 and below 180 degrees.
     Angle(f64),
+    /// A view from a point to itself, or so far that the square of the distance leaves the range of `f64`.
+    Sight {
+        /// The eye.
+        from: DVec3,
+        /// What it looks at.
+        at: DVec3,
+    },
     /// The file ends where something is missing.
     Ends {
         /// What is missing.
@@ -133,6 +141,15 @@ impl fmt::Display for NffProblem {
             }
             NffProblem::Angle(angle) => {
                 write!(f, "the field of view must be between 0 and 180 degrees, not {angle}")
+            }
+            NffProblem::Sight { from, at } => {
+                let point = |p: DVec3| format!("{:?} {:?} {:?}", p.x, p.y, p.z);
+                write!(f, "the view looks from {} at ", point(*from))?;
+                if from == at {
+                    write!(f, "the same point")
+                } else {
+                    write!(f, "{}: so far that the square of the distance is no number", point(*at))
+                }
             }
             NffProblem::Ends { what } => write!(f, "the file ends before {what}"),
             NffProblem::Sphere(error) => error.fmt(f),
@@ -271,12 +288,13 @@ impl Reader {
         if !(angle > 0.0 && angle < 180.0) {
             return Err(NffProblem::Angle(angle));
         }
-        self.view = Some(View {
-            from: from.ok_or(lacks("the eye of the view (from)"))?,
-            at: at.ok_or(lacks("what the view looks at (at)"))?,
-            up: up.ok_or(lacks("the up of the view"))?,
-            angle: angle.to_radians(),
-        });
+        let from: DVec3 = from.ok_or(lacks("the eye of the view (from)"))?;
+        let at: DVec3 = at.ok_or(lacks("what the view looks at (at)"))?;
+        if from == at || !(at - from).length_squared().is_finite() {
+            return Err(NffProblem::Sight { from, at });
+        }
+        self.view =
+            Some(View { from, at, up: up.ok_or(lacks("the up of the view"))?, angle: angle.to_radians() });
         Ok(())
     }
 

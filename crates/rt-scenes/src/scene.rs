@@ -1,6 +1,6 @@
 //! [`Scene`]: shapes, looks, lights, a view.
 
-use crate::{Solid, fine, interior, soup, spd, stadium, terrain};
+use crate::{Solid, fine, gallery, interior, soup, spd, stadium, terrain};
 use core::fmt;
 use rt_accel::{Bounded, WorldBound};
 use rt_bounds::Aabb;
@@ -73,7 +73,7 @@ pub enum SceneGeometry {
     Mesh(TriangleMesh),
     /// Triangles too small for their distance from zero to be told apart in `f32`; they answer `f64` rays.
     FineMesh(TriangleMesh<f64>),
-    /// Spheres and polygons.
+    /// Solids of all kinds.
     Solids(Vec<Solid>),
 }
 
@@ -257,37 +257,62 @@ pub(crate) fn sized(name: &'static str, size: u32, min: u32, max: u32) -> Result
 /// A scene by its name, of its default size where none is given.
 type Maker = fn(Option<u32>) -> Result<Scene, SceneError>;
 
-/// All scenes, each by name.
-const SCENES: &[(&str, Maker)] = &[
-    ("balls", |size| spd::balls(size.unwrap_or(4))),
-    ("gears", |size| spd::gears(size.unwrap_or(4))),
-    ("jacks", |size| spd::jacks(size.unwrap_or(3))),
-    ("lattice", |size| spd::lattice(size.unwrap_or(12))),
-    ("mount", |size| spd::mount(size.unwrap_or(6))),
-    ("rings", |size| spd::rings(size.unwrap_or(7))),
-    ("shells", |size| spd::shells(size.unwrap_or(5))),
-    ("sombrero", |size| spd::sombrero(size.unwrap_or(1))),
-    ("teapot", |size| spd::teapot(size.unwrap_or(12))),
-    ("tetra", |size| spd::tetra(size.unwrap_or(6))),
-    ("tree", |size| spd::tree(size.unwrap_or(11))),
-    ("stadium", |size| stadium::stadium(870.0, size.unwrap_or(12))),
-    ("interior", |size| interior::interior(size.unwrap_or(3))),
-    ("terrain", |size| terrain::terrain(size.unwrap_or(708))),
-    ("soup", |size| triangles("soup", size, |n| soup::uniform(n, 1))),
-    ("clusters", |size| triangles("clusters", size, |n| soup::clusters(n, 1))),
-    ("sticks", |size| triangles("sticks", size, |n| soup::sticks(n, 1e3, 1))),
-    ("needles", |size| triangles("needles", size, soup::needles)),
-    ("icosphere", |size| {
+/// All scenes: name, what it is, and how it is made.
+const SCENES: &[(&str, &str, Maker)] = &[
+    ("balls", "a flake of spheres, to a depth of 4", |size| spd::balls(size.unwrap_or(4))),
+    ("gears", "meshing gears, some of glass, 4 along each side", |size| spd::gears(size.unwrap_or(4))),
+    ("jacks", "a jack of jacks of cones and spheres, to a depth of 3", |size| spd::jacks(size.unwrap_or(3))),
+    ("lattice", "a lattice of spheres and cylinders, 12 cells a side", |size| {
+        spd::lattice(size.unwrap_or(12))
+    }),
+    ("mount", "a fractal mountain under four glass spheres, cut 6 times", |size| {
+        spd::mount(size.unwrap_or(6))
+    }),
+    ("rings", "a pyramid of linked rings, 7 layers", |size| spd::rings(size.unwrap_or(7))),
+    ("shells", "a sea shell of spheres that cross, doubled 5 times", |size| spd::shells(size.unwrap_or(5))),
+    ("sombrero", "a hat of triangles, on a grid doubled 1 time", |size| spd::sombrero(size.unwrap_or(1))),
+    ("teapot", "the Utah teapot of triangles on a board, 12 cells a patch", |size| {
+        spd::teapot(size.unwrap_or(12))
+    }),
+    ("tetra", "a tetrahedron of tetrahedra, to a depth of 6", |size| spd::tetra(size.unwrap_or(6))),
+    ("tree", "a tree of cones in a wide field, forked 11 times", |size| spd::tree(size.unwrap_or(11))),
+    ("stadium", "a teapot in a stadium, 12 cells a patch", |size| {
+        stadium::stadium(870.0, size.unwrap_or(12))
+    }),
+    ("interior", "a furnished room, in a detail of 3", |size| interior::interior(size.unwrap_or(3))),
+    ("terrain", "mountains and a lake of a million triangles, 708 cells a side", |size| {
+        terrain::terrain(size.unwrap_or(708))
+    }),
+    ("patches", "the Utah teapot by its Bézier patches, on bilinear ones; 1 pot a side", |size| {
+        gallery::patches(size.unwrap_or(1))
+    }),
+    ("quadrics", "nine quadrics and disks, cut open; 9 twelfths of a turn are left", |size| {
+        gallery::quadrics(size.unwrap_or(9))
+    }),
+    ("loop", "Loop subdivision surfaces in their cages, in 4 levels", |size| {
+        gallery::loops(size.unwrap_or(4))
+    }),
+    ("julia", "quaternion Julia sets over a mirror, 3 of them", |size| gallery::julia(size.unwrap_or(3))),
+    ("mountains", "a fractal terrain of facets made when looked at, in 11 levels", |size| {
+        gallery::mountains(size.unwrap_or(11))
+    }),
+    ("soup", "10000 triangles anywhere", |size| triangles("soup", size, |n| soup::uniform(n, 1))),
+    ("clusters", "10000 triangles in clusters", |size| triangles("clusters", size, |n| soup::clusters(n, 1))),
+    ("sticks", "10000 triangles a thousand times as long as wide", |size| {
+        triangles("sticks", size, |n| soup::sticks(n, 1e3, 1))
+    }),
+    ("needles", "10000 long triangles in a bundle", |size| triangles("needles", size, soup::needles)),
+    ("icosphere", "a sphere of triangles, cut 5 times", |size| {
         Ok(around("icosphere", soup::icosphere(sized("icosphere", size.unwrap_or(5), 0, 10)?)))
     }),
-    ("crumpled", |size| {
+    ("crumpled", "a crumpled sphere that crosses itself, cut 4 times", |size| {
         Ok(around("crumpled", soup::crumpled(sized("crumpled", size.unwrap_or(4), 0, 10)?, 4.0, 1)))
     }),
-    ("torus", |size| {
+    ("torus", "a torus of triangles, 40 around its tube", |size| {
         let n = sized("torus", size.unwrap_or(40), 3, 2500)?;
         Ok(around("torus", soup::torus(2 * n, n, 0.4)))
     }),
-    ("rubble", rubble),
+    ("rubble", "10000 triangles so far out that only f64 tells them apart", rubble),
 ];
 
 /// `n` triangles by `make`, 10 000 where no number is given, seen from outside.
@@ -333,6 +358,16 @@ pub fn names() -> Vec<&'static str> {
     SCENES.iter().map(|scene| scene.0).collect()
 }
 
+/// What the scene called `name` shows, in a few words, its default size among them; `None` if there is no such scene.
+///
+/// ```
+/// let torus = rt_scenes::about("torus").unwrap();
+/// assert_eq!(torus, "a torus of triangles, 40 around its tube");
+/// ```
+pub fn about(name: &str) -> Option<&'static str> {
+    SCENES.iter().find(|scene| scene.0 == name).map(|scene| scene.1)
+}
+
 /// The scene called `name`, in `size`; without one, in its default size. What sizes mean is up to the scene.
 ///
 /// # Errors
@@ -340,7 +375,7 @@ pub fn names() -> Vec<&'static str> {
 /// When there is no such scene, or not in this size.
 pub fn by_name(name: &str, size: Option<u32>) -> Result<Scene, SceneError> {
     match SCENES.iter().find(|scene| scene.0 == name) {
-        Some((_, make)) => make(size),
+        Some((.., make)) => make(size),
         None => Err(SceneError::Unknown { name: name.to_string() }),
     }
 }
@@ -353,7 +388,8 @@ mod tests {
     fn every_scene_has_a_name_and_every_name_a_scene() {
         for name in names() {
             let size = by_name(name, None).map(|scene| scene.prim_count());
-            assert!(size.is_ok_and(|n| n > 100), "{name}");
+            assert!(size.is_ok_and(|n| n > 1), "{name}");
+            assert!(about(name).is_some_and(|what| what.len() > 10 && what.len() < 80), "{name}");
             assert!(by_name(name, Some(u32::MAX)).is_err(), "{name}");
         }
         let error = by_name("bunny", None).unwrap_err().to_string();

@@ -1,6 +1,6 @@
 //! [`Solid`]: one shape of a mixed scene.
 
-use crate::Facet;
+use crate::{Facet, Placed};
 use core::ops::ControlFlow;
 use rt_accel::{Counts, Hit, Primitive, WorldBound};
 use rt_bounds::Aabb;
@@ -10,7 +10,8 @@ use rt_shapes::{Frustum, Partials, Polygon, Shape, Sphere, Surface, Uv};
 
 /// One solid of a mixed scene: answers as the shape inside does, rays of both precisions.
 ///
-/// A closed set of shapes, 64 bytes each and what they refer to, so that no call is virtual.
+/// Shapes that scenes hold many of are a closed set, 64 bytes each and what they refer to, so that no call is virtual; whatever
+/// else can be hit is [`Placed`].
 ///
 /// ```
 /// use rt_accel::{Aggregate, Exhaustive, Primitive};
@@ -34,6 +35,8 @@ pub enum Solid {
     Facet(Facet),
     /// A cylinder or cone without ends; elsewhere, because it is several times as large as the others.
     Frustum(Box<Frustum>),
+    /// Anything else, by a virtual call.
+    Placed(Box<Placed>),
 }
 
 impl From<Sphere> for Solid {
@@ -60,6 +63,12 @@ impl From<Frustum> for Solid {
     }
 }
 
+impl From<Placed> for Solid {
+    fn from(placed: Placed) -> Solid {
+        Solid::Placed(Box::new(placed))
+    }
+}
+
 /// The same call on whichever shape is inside.
 macro_rules! each {
     ($solid:expr, $shape:ident => $call:expr) => {
@@ -68,6 +77,7 @@ macro_rules! each {
             Solid::Polygon($shape) => $call,
             Solid::Facet($shape) => $call,
             Solid::Frustum($shape) => $call,
+            Solid::Placed($shape) => $call,
         }
     };
 }

@@ -93,41 +93,41 @@ const fn known(
     Known { scene, size, primitives, haines, rays }
 }
 
-fn view(from: [f64; 3], at: [f64; 3], up: [f64; 3], degrees: f64) -> View {
+pub(crate) fn view(from: [f64; 3], at: [f64; 3], up: [f64; 3], degrees: f64) -> View {
     let [from, at, up] = [from, at, up].map(DVec3::from_array);
     View { from, at, up, angle: degrees.to_radians() }
 }
 
 /// Solids and their looks, while a scene is being made. Dimensions are a generator's own, so that none is refused.
-struct Pile {
+pub(crate) struct Pile {
     solids: Vec<Solid>,
     material_of: Vec<u32>,
 }
 
 impl Pile {
-    fn new(count: usize) -> Pile {
+    pub(crate) fn new(count: usize) -> Pile {
         Pile { solids: Vec::with_capacity(count), material_of: Vec::with_capacity(count) }
     }
 
-    fn push(&mut self, solid: impl Into<Solid>, material: u32) {
+    pub(crate) fn push(&mut self, solid: impl Into<Solid>, material: u32) {
         self.solids.push(solid.into());
         self.material_of.push(material);
     }
 
-    fn sphere(&mut self, center: DVec3, radius: f64, material: u32) {
+    pub(crate) fn sphere(&mut self, center: DVec3, radius: f64, material: u32) {
         self.push(Sphere::new(center, radius).expect("a generator's sphere"), material);
     }
 
-    fn polygon(&mut self, corners: &[DVec3], material: u32) {
+    pub(crate) fn polygon(&mut self, corners: &[DVec3], material: u32) {
         self.push(Polygon::new(corners).expect("a generator's polygon"), material);
     }
 
-    fn frustum(&mut self, [base, top]: [DVec3; 2], [r0, r1]: [f64; 2], material: u32) {
+    pub(crate) fn frustum(&mut self, [base, top]: [DVec3; 2], [r0, r1]: [f64; 2], material: u32) {
         self.push(Frustum::new(base, r0, top, r1).expect("a generator's frustum"), material);
     }
 
     /// The scene, without lights and not looked at.
-    fn scene(self, name: &str, materials: Vec<Material>) -> Scene {
+    pub(crate) fn scene(self, name: &str, materials: Vec<Material>) -> Scene {
         Scene {
             name: name.to_string(),
             geometry: SceneGeometry::Solids(self.solids),

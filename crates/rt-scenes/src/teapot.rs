@@ -7,6 +7,11 @@ use crate::numbers::mesh;
 use rt_geom::glam::DVec3;
 use rt_shapes::TriangleMesh;
 
+/// The control points of each patch, as [`BezierPatch::new`](rt_shapes::BezierPatch::new) takes them.
+pub(crate) fn patches() -> impl Iterator<Item = [DVec3; 16]> {
+    PATCHES.into_iter().map(|patch| patch.map(|i| DVec3::from_array(VERTICES[usize::from(i) - 1])))
+}
+
 /// The pot as triangles of `f64`: each patch on a grid of `n x n` squares, two triangles each, and none where a side of a patch is
 /// a point: `64 n^2 - 8 n` triangles for `n` from 1.
 ///
@@ -36,8 +41,7 @@ fn grid(n: u32, value: impl Fn(&[DVec3; 16], f64, f64) -> DVec3) -> (Vec<DVec3>,
     let mut values = Vec::with_capacity(32 * (n as usize + 1).pow(2));
     let mut triangles = Vec::with_capacity(64 * (n as usize).pow(2));
     let at = |i: u32| f64::from(i) / f64::from(n);
-    for patch in PATCHES {
-        let net = patch.map(|i| DVec3::from_array(VERTICES[usize::from(i) - 1]));
+    for net in patches() {
         // Rows that are one point: their triangles have two corners there, and are none.
         let tip = |i: u32| {
             let row = &net[12 * i as usize..][..4];

@@ -13,9 +13,12 @@ use std::io::{self, Write};
 ///
 /// # Errors
 ///
-/// When `to` cannot be written to; and of kind [`InvalidData`](io::ErrorKind::InvalidData) for triangles with vertices that are
-/// not finite, which have no place in one either.
+/// When `to` cannot be written to; and of kind [`InvalidData`](io::ErrorKind::InvalidData), before anything is written, for what
+/// has no place in one either: [placed](Solid::Placed) shapes, and triangles with vertices that are not finite.
 pub fn write(scene: &Scene, to: &mut impl Write) -> io::Result<()> {
+    if let Some(why) = misfit(&scene.geometry) {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, format!("{}: {why}", scene.name)));
+    }
     let view = scene.view;
     writeln!(to, "v")?;
     line(to, "from", view.from)?;
@@ -47,10 +50,34 @@ pub fn write(scene: &Scene, to: &mut impl Write) -> io::Result<()> {
                             writeln!(to, "{} {radius}", Three(end.to_array()))?;
                         }
                     }
+                    // There is none: see `misfit`.
+                    Solid::Placed(_) => {}
                 }
             }
             Ok(())
         }
+    }
+}
+
+/// What NFF has no words for, if there is such a thing.
+fn misfit(geometry: &SceneGeometry) -> Option<String> {
+    fn endless<V: Real>(mesh: &TriangleMesh<V>) -> Option<String> {
+        let wrong = |i: &u32| !mesh.vertices()[*i as usize].iter().all(|&x| x.into().is_finite());
+        let triangle = mesh.triangles().iter().position(|corners| corners.iter().any(wrong))?;
+        Some(format!("triangle {triangle} has a vertex that is not finite"))
+    }
+    match geometry {
+        SceneGeometry::Mesh(mesh) => endless(mesh),
+        SceneGeometry::FineMesh(mesh) => endless(mesh),
+        SceneGeometry::Solids(solids) => (0..).zip(solids).find_map(|(prim, solid): (u32, _)| match solid {
+            Solid::Placed(placed) => {
+                Some(format!("solid {prim} is {}, which NFF has no word for", placed.what()))
+            }
+            Solid::Facet(facet) if !facet.corners().iter().all(|p| p.is_finite()) => {
+                Some(format!("solid {prim} has a vertex that is not finite"))
+            }
+            _ => None,
+        }),
     }
 }
 
@@ -97,10 +124,6 @@ fn triangles<V: Real + std::fmt::Display>(
         writeln!(to, "{} 3", if normals.is_some() { "pp" } else { "p" })?;
         for (i, &number) in numbers.iter().enumerate() {
             let place = mesh.vertices()[number as usize];
-            if !place.iter().all(|&x| x.into().is_finite()) {
-                let why = format!("triangle {prim} has a vertex that is not finite");
-                return Err(io::Error::new(io::ErrorKind::InvalidData, why));
-            }
             match normals {
                 Some(normals) => writeln!(to, "{}{}", Three(place), Three(normals[i]))?,
                 None => writeln!(to, "{}", Three(place))?,
