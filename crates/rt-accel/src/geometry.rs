@@ -36,7 +36,8 @@ pub trait Bounded: Send + Sync {
 /// What of a primitive counts in a cell: a knob of structures that divide space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clip {
-    /// The part of it that lies in the cell ([`Bounded::clipped_bound`]): exact for triangles.
+    /// The part of it that lies in the cell ([`Bounded::clipped_bound`]): exact for triangles and
+    /// polygons, and for spheres, cones and cylinders whether there is any.
     Exact,
     /// The part of its box. Builds faster, and cells have more references.
     Box,
@@ -152,6 +153,9 @@ impl<P: crate::WorldBound> Bounded for Vec<P> {
     }
     fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
         self.get(prim as usize).map_or(DAabb::EMPTY, |member| member.bound_under(map))
+    }
+    fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
+        self.get(prim as usize).map_or(Aabb::EMPTY, |member| member.clipped_bound(cell, origin))
     }
 }
 

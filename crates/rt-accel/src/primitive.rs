@@ -31,6 +31,11 @@ pub trait WorldBound: Send + Sync {
     fn bound_under(&self, map: &Transform) -> DAabb {
         self.world_bound().carried(map)
     }
+
+    /// A box around the part of it inside `cell`, both relative to `origin`; empty where nothing is. The default cuts the box.
+    fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
+        self.world_bound_from(origin).overlap(*cell)
+    }
 }
 
 /// Something a ray can hit, from any thread, in world space, by rays of precision `R`.
@@ -118,6 +123,9 @@ macro_rules! forward {
             }
             fn bound_under(&self, map: &Transform) -> DAabb {
                 (**self).bound_under(map)
+            }
+            fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
+                (**self).clipped_bound(cell, origin)
             }
         }
 

@@ -79,6 +79,9 @@ impl WorldBound for Facet {
     fn world_bound_from(&self, origin: DVec3) -> Aabb {
         self.mesh.bound_from(self.number, origin)
     }
+    fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
+        self.mesh.clipped_bound(self.number, cell, origin)
+    }
 }
 
 impl<R: Real> Primitive<R> for Facet {

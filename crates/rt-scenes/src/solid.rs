@@ -89,6 +89,9 @@ impl WorldBound for Solid {
     fn world_bound_from(&self, origin: DVec3) -> Aabb {
         each!(self, shape => shape.world_bound_from(origin))
     }
+    fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
+        each!(self, shape => shape.clipped_bound(cell, origin))
+    }
 }
 
 impl<R: Real> Primitive<R> for Solid {

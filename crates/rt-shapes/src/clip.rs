@@ -1,7 +1,72 @@
-//! What of a triangle lies in a box: for builders that split space.
+//! What of a shape lies in a box: for builders that split space.
 
+use crate::Triangle;
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
+
+impl Triangle {
+    /// A box around the part of it inside `cell`, both relative to `origin`; empty where nothing is, or a corner is not finite.
+    pub fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
+        match self.corners.iter().all(|c| c.is_finite()) {
+            true => clipped_bound(self.corners, cell, origin),
+            false => Aabb::EMPTY,
+        }
+    }
+}
+
+/// Whether the surface of a ball stays out of `cell`, which is relative to `origin`: the cell lies outside the ball, or inside.
+/// `false` where rounding leaves it open.
+///
+/// Error: a difference is off by at most 3 roundings of the largest number in it, its square by 2 more, and sums of three by 2:
+/// here is room for sixteen.
+///
+/// Source: Arvo, "A simple method for box-sphere intersection testing", Graphics Gems (1990).
+pub(crate) fn sphere_avoids(center: DVec3, radius: f64, cell: &Aabb, origin: DVec3) -> bool {
+    let (low, high, c) = (cell.min.as_dvec3(), cell.max.as_dvec3(), center - origin);
+    let slack = (center.abs() + origin.abs() + low.abs().max(high.abs())) * ROOM;
+    let nearest = ((low - c).max(c - high) - slack).max(DVec3::ZERO);
+    let farthest = (low - c).abs().max((high - c).abs()) + slack;
+    let square = radius * radius;
+    // False for what is not a number, and where squares leave the range.
+    nearest.length_squared() * (1.0 - ROOM) > square * (1.0 + ROOM)
+        || (farthest.length_squared() * (1.0 + ROOM) < square * (1.0 - ROOM) && square.is_finite())
+}
+
+/// Whether a direction separates `cell`, which is relative to `origin`, from the hull of two circles with `ends` for middles,
+/// perpendicular to the line between them: along that line, or away from it towards the cell. `false` where rounding leaves it
+/// open.
+///
+/// Error: any direction is as good as another, so its own rounding does not matter; products along it are off by at most eight
+/// roundings of their largest term, and here is room for sixteen.
+///
+/// Source: Gottschalk, Lin and Manocha, "OBBTree", SIGGRAPH 1996 (separating axes).
+pub(crate) fn frustum_avoids(ends: [DVec3; 2], radii: [f64; 2], cell: &Aabb, origin: DVec3) -> bool {
+    let (low, high) = (cell.min.as_dvec3(), cell.max.as_dvec3());
+    let (center, half) = ((low + high) * 0.5, (high - low) * 0.5);
+    let [base, top] = ends.map(|end| end - origin);
+    let axis = top - base;
+    let size = ends[0].abs().max(ends[1].abs()) + origin.abs() + low.abs().max(high.abs());
+    // `reach`: how far a circle of radius 1 extends along the direction.
+    let separates = |dir: DVec3, reach: f64| {
+        let ends = [(base.dot(dir), radii[0] * reach), (top.dot(dir), radii[1] * reach)];
+        let [from, to] = [
+            ends.iter().fold(f64::INFINITY, |m, (at, r)| m.min(at - r)),
+            ends.iter().fold(f64::NEG_INFINITY, |m, (at, r)| m.max(at + r)),
+        ];
+        let (at, r) = (center.dot(dir), half.dot(dir.abs()));
+        let slack = (size.dot(dir.abs()) + radii[0].max(radii[1]) * reach) * ROOM;
+        at - r > to + slack || at + r < from - slack
+    };
+    // What rounding leaves of a circle's extent along its own axis.
+    if separates(axis, axis.length() * ROOM + size.max_element() * ROOM) {
+        return true;
+    }
+    let away = (center - base) - axis * ((center - base).dot(axis) / axis.length_squared());
+    separates(away, away.length() * (1.0 + ROOM))
+}
+
+/// Sixteen roundings.
+const ROOM: f64 = 8.0 * f64::EPSILON;
 
 /// A triangle cut by six planes has at most this many corners.
 const MOST: usize = 9;
@@ -121,5 +186,40 @@ mod tests {
         assert!(near(part.min.y, 2.0) && near(part.max.y, 3.0) && near(part.max.z, 0.375), "{part:?}");
         let beside = Aabb::new(Vec3A::new(2.0, 4.0, 0.0), Vec3A::new(3.0, 8.0, 8.0));
         assert!(clipped_bound(corners, &beside, DVec3::ZERO).is_empty());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        /// Points of the surfaces stand in cells that are not avoided; cells far away are.
+        #[test]
+        fn cells_with_a_point_of_the_surface_are_not_avoided(
+            p in point(), q in point(), r in 0.01..2.0f64, s in 0.0..2.0f64, way in point(), v in 0.0..=1.0f64,
+            size in prop_oneof![Just(0.0f32), 1e-6..1.0f32], far in 0..3u8,
+        ) {
+            let origin = DVec3::splat([0.0, 1e7, -3e12][far as usize]);
+            let (base, top) = (DVec3::from_array(p) + origin, DVec3::from_array(q) + origin);
+            let dir = DVec3::from_array(way).normalize_or(DVec3::X);
+            // What the shift rounds off is part of the shape.
+            let around = |point: DVec3, tolerance: f64| {
+                let at = (point - origin).as_vec3a();
+                let room = Vec3A::splat(size + 1e-6 + tolerance as f32);
+                Aabb::new(at - room, at + room)
+            };
+            let tolerance = origin.abs().max_element() * 1e-15;
+            let cell = around(base + dir * r, tolerance);
+            prop_assert!(!sphere_avoids(base, r, &cell, origin));
+            let axis = top - base;
+            if axis.length() > 1e-3 {
+                let across = dir.cross(axis).try_normalize().unwrap_or(axis.any_orthonormal_vector());
+                let point = base + axis * v + across * (r + (s - r) * v);
+                prop_assert!(!frustum_avoids([base, top], [r, s], &around(point, tolerance), origin));
+                let beyond = around(base - axis.normalize() * 0.5 - axis * 0.01, 0.0);
+                prop_assert!(far == 2 || size > 0.2 || frustum_avoids([base, top], [r, s], &beyond, origin));
+            }
+            let outside = around(base + dir * (r + 2.0), 0.0);
+            let inside = around(base, 0.0);
+            prop_assert!(far == 2 || size > 0.9 || sphere_avoids(base, r, &outside, origin));
+            prop_assert!(far == 2 || r < 0.1 || size > 0.05 || sphere_avoids(base, r, &inside, origin));
+        }
     }
 }

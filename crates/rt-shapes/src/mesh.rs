@@ -6,7 +6,6 @@ mod orientation;
 pub use area::{AreaSample, MeshSampler};
 pub use orientation::{Component, Facing, Orientation};
 
-use crate::clip::clipped_bound;
 use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
@@ -219,12 +218,7 @@ impl<V: Real> Bounded for TriangleMesh<V> {
     }
 
     fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
-        match self.get(prim) {
-            Some(triangle) if triangle.corners.iter().all(|c| c.is_finite()) => {
-                clipped_bound(triangle.corners, cell, origin)
-            }
-            _ => Aabb::EMPTY,
-        }
+        self.get(prim).map_or(Aabb::EMPTY, |triangle| triangle.clipped_bound(cell, origin))
     }
 
     fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {

@@ -147,6 +147,10 @@ impl WorldBound for Polygon {
     fn bound_under(&self, map: &Transform) -> DAabb {
         DAabb::around_carried(self.triangles.iter().flat_map(|t| t.corners), map)
     }
+    fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
+        let parts = self.triangles.iter().map(|t| t.clipped_bound(cell, origin));
+        parts.fold(Aabb::EMPTY, Aabb::union)
+    }
 }
 
 impl<R: Real> Primitive<R> for Polygon {

@@ -1,5 +1,6 @@
 //! [`Sphere`]: full spheres.
 
+use crate::clip::sphere_avoids;
 use crate::{Partials, Shape, Surface, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
@@ -214,6 +215,14 @@ impl WorldBound for Sphere {
         let min = DVec3::from_array(self.center.to_array().map(below));
         let max = -DVec3::from_array((-self.center).to_array().map(below));
         Aabb::from_f64(min, max, origin)
+    }
+
+    /// Its box within the cell, empty where the cell holds none of the surface.
+    fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
+        match sphere_avoids(self.center, self.radius, cell, origin) {
+            true => Aabb::EMPTY,
+            false => self.world_bound_from(origin).overlap(*cell),
+        }
     }
 
     /// The box of the ellipsoid that the map makes of the sphere: it reaches as far as the rows of the map are long.

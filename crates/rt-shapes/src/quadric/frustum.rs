@@ -4,6 +4,7 @@ use super::form::{Extent, Form, Number, Terms};
 use super::solve;
 use super::sweep::Sweep;
 use super::{LARGEST, QuadricError, Root, surface};
+use crate::clip::frustum_avoids;
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::{PI, TAU};
 use core::ops::ControlFlow;
@@ -246,6 +247,14 @@ impl WorldBound for Frustum {
             }
         }
         Aabb::from_f64(min, max, origin)
+    }
+
+    /// Its box within the cell, empty where the cell lies beyond the planes of the rims or away from the axis.
+    fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
+        match frustum_avoids(self.ends, self.radii, cell, origin) {
+            true => Aabb::EMPTY,
+            false => self.world_bound_from(origin).overlap(*cell),
+        }
     }
 }
 
