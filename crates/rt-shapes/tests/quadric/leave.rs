@@ -102,5 +102,6 @@ fn spawned_rays_leave() {
 fn spawned_rays_leave_in_millions() {
     let number = |name, default| std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(default);
     let left = run(number("RT_SEED", 1), number("RT_CASES", 1_000_000));
+    println!("{left:?}");
     assert_eq!(left.met_again, 0, "{left:?}");
 }
