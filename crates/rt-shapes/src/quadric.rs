@@ -12,6 +12,7 @@ mod sweep;
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use revolved::Quadric;
+pub(crate) use sweep::share;
 
 use core::fmt;
 use rt_geom::expansion::two_sum;

@@ -387,10 +387,11 @@ impl Quadric {
         let (dpdu, inward) = (around(p), (-p * (range * range)).extend(0.0));
         // The derivative along v, and the second one; that along both is the former turned.
         let (dpdv, bent) = match self.kind {
-            Kind::Sphere { .. } => {
+            Kind::Sphere { radius } => {
                 let [low, high] = self.polar();
-                let range = high - low;
-                ((out * point.z).extend(-rho) * range, -point * (range * range))
+                let dpdv = (out * point.z).extend(-rho) * (high - low);
+                // The normal is the point, over the radius: at the poles, too.
+                return Partials { dpdu, dpdv, dndu: dpdu / radius, dndv: dpdv / radius };
             }
             Kind::Cylinder { .. } => (DVec3::Z * rise, DVec3::ZERO),
             Kind::Cone { height, radius } => ((out * (-radius / height)).extend(1.0) * rise, DVec3::ZERO),

@@ -37,7 +37,7 @@ pub(super) fn direction(phi: f64) -> DVec2 {
 }
 
 /// Where `p` lies between two angles, from 0 to 1; outside, the nearer end.
-pub(super) fn share([from, to]: [f64; 2], p: DVec2) -> f64 {
+pub(crate) fn share([from, to]: [f64; 2], p: DVec2) -> f64 {
     let (start, range) = (direction(from), to - from);
     let phi = start.perp_dot(p).atan2(start.dot(p));
     let phi = if phi < 0.0 { phi + TAU } else { phi };
