@@ -72,10 +72,11 @@ impl Disk {
     }
 
     /// Only the part from one angle counter-clockwise to another, in radians from the x axis; at most a full turn.
+    /// Both ends belong to it, as those of a [`Quadric`](crate::Quadric).
     ///
     /// # Errors
     ///
-    /// When the range is empty, inverted, not finite or more than a turn.
+    /// When the range is empty, or narrower than rounding, inverted, not finite or more than a turn.
     pub fn swept(self, from: f64, to: f64) -> Result<Disk, QuadricError> {
         Ok(Disk { angles: [from, to], sweep: Sweep::new([from, to])?, ..self })
     }

@@ -34,8 +34,10 @@ use rt_geom::{Ray, Real};
 /// that may lie on a border by twice the digits does; a distance that may be 0 is. A line that lies in the surface does not
 /// meet it.
 ///
-/// The ends of a sweep are the directions that `cos` and `sin` of the angles round to. Sizes, distances and components of
-/// directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e290`;
+/// The ends of a sweep belong to it. They are the directions that `cos` and `sin` of the angles round to; the axes within `2^-50`
+/// of a turn of quarter turns, up to two turns. So parts of a turn that abut lose nothing of the whole between them, also where
+/// it closes: as from 0 to `PI` and on to `TAU`. Other ends outside of `[0, TAU)` reach `2^-49` of the angle, or of a turn,
+/// further: such a number may be another with a turn added, which rounds. Sizes, distances and components of directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e290`;
 /// [`Surface`] records and areas want sizes from `1e-70` to `1e70`.
 ///
 /// Source: the parametrisations: Pharr and Humphreys, *Physically Based Rendering* (2004), sections 3.2 to 3.5; double-double
@@ -182,11 +184,11 @@ impl Quadric {
     }
 
     /// Only the part from one angle counter-clockwise to another, in radians from the x axis (of a hyperboloid: from its segment);
-    /// at most a full turn.
+    /// at most a full turn. Both ends belong to it.
     ///
     /// # Errors
     ///
-    /// When the range is empty, inverted, not finite or more than a turn.
+    /// When the range is empty, or narrower than rounding, inverted, not finite or more than a turn.
     pub fn swept(self, from: f64, to: f64) -> Result<Quadric, QuadricError> {
         Ok(Quadric { angles: [from, to], sweep: Sweep::new([from, to])?, ..self })
     }

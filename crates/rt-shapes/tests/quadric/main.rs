@@ -5,4 +5,5 @@ mod frustum;
 mod judge;
 mod leave;
 mod revolved;
+mod seams;
 mod surface;

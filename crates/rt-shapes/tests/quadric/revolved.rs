@@ -8,6 +8,7 @@ use rt_geom::glam::{DVec2, DVec3};
 use rt_measure::exact::{self, Rational};
 use rt_measure::rays::Seeded;
 use rt_shapes::{Quadric, Root};
+use std::f64::consts::TAU;
 
 /// A quadric as the numbers that define it: what the oracle knows.
 #[derive(Clone, Copy, Debug)]
@@ -163,6 +164,12 @@ impl Part {
             let (along, beside) = (&(&gx * &x) + &(&gy * &y), &(&gx * &y) - &(&gy * &x));
             let play = whole(play * (gx.to_f64().abs() + gy.to_f64().abs()));
             let side = |phi: f64| &(&whole(phi.cos()) * &beside) - &(&whole(phi.sin()) * &along);
+            // As documented: further out where the number may be another's with a turn added.
+            let out = |phi: f64| match (0.0..TAU).contains(&phi) {
+                true => 0.0,
+                false => 8.0 * f64::EPSILON * phi.abs().max(TAU),
+            };
+            let (from, to) = (from - out(from), to + out(to));
             let (after, before) = ((&side(from) + &play).sign() >= 0, (&side(to) - &play).sign() <= 0);
             if to - from > std::f64::consts::PI { after || before } else { after && before }
         });
@@ -300,7 +307,7 @@ fn bounds_of_parts_are_tight() {
     for _ in 0..300 {
         let part = Part::random(&mut seeded, 1.0);
         let bound = part.shape().world_bound();
-        let [from, to] = part.sweep.unwrap_or([0.0, std::f64::consts::TAU]);
+        let [from, to] = part.sweep.unwrap_or([0.0, TAU]);
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for i in 0..=200 {
             for j in 0..=200 {
