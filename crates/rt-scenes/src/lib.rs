@@ -39,4 +39,5 @@ mod trial;
 pub use facet::Facet;
 pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, by_name, names};
 pub use solid::Solid;
+pub use teapot::teapot_nets;
 pub use trial::{Closed, Trial, closed_meshes, fine_trials, trials};

@@ -4,6 +4,7 @@ use super::form::{Extent, Form, Number, Terms};
 use super::partials::weingarten;
 use super::sweep::{Sweep, arc, direction, share};
 use super::{LARGEST, QuadricError, Root, solve, surface};
+use crate::surface::unit;
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::TAU;
 use core::ops::ControlFlow;
@@ -334,10 +335,12 @@ impl Quadric {
         0.5 * (line + bend)
     }
 
-    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`.
+    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`. Numbers
+    /// outside are moved to the nearest inside, NaN to 0.
     pub fn sample(&self, xi: DVec2) -> Surface {
+        let xi = unit(xi);
         let [low, high] = self.z;
-        let share = xi.y.clamp(0.0, 1.0);
+        let share = xi.y;
         let z = match self.kind {
             Kind::Sphere { .. } | Kind::Cylinder { .. } => low + (high - low) * share,
             // The area grows with z: halve until it fits. The density is continuous, so sixty steps leave nothing.

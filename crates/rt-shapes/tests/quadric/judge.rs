@@ -58,7 +58,7 @@ pub(crate) struct Tally {
     pub(crate) invented: u64,
     /// Beyond the reported bound.
     pub(crate) beyond: u64,
-    /// Over 4 units in the last place where the condition is below 1e6.
+    /// Over a unit in the last place where the condition is below 1e6.
     pub(crate) coarse: u64,
     pub(crate) worst: f64,
     /// The first few of these.
@@ -109,7 +109,7 @@ impl Tally {
             let condition = condition(exact);
             if condition < 1e6 {
                 self.worst = self.worst.max(off / ulp);
-                if off > 4.0 * ulp {
+                if off > ulp {
                     self.coarse += 1;
                     self.tell(format!(
                         "{} ulp at {exact:e} (condition {condition:e}) of {case:?}: {found:?}",
