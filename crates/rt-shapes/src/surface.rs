@@ -33,8 +33,7 @@ pub struct Surface {
 
 /// Two numbers to sample by, moved into `[0, 1]`; NaN to 0.
 pub(crate) fn unit(xi: DVec2) -> DVec2 {
-    // The number, where the other is NaN.
-    let inside = |x: f64| x.max(0.0).min(1.0);
+    let inside = |x: f64| if x > 0.0 { x.min(1.0) } else { 0.0 };
     DVec2::new(inside(xi.x), inside(xi.y))
 }
 

@@ -113,7 +113,7 @@ impl<V: Real> TriangleMesh<V> {
     /// assert_eq!((mesh.area(), mesh.degenerate()), (2.0, 1));
     /// let sampler = mesh.sampler().unwrap();
     /// let spot = sampler.sample(DVec2::new(0.75, 0.9));
-    /// assert_eq!((spot.point, sampler.area()), (DVec3::new(0.25, 1.3, 0.0), 2.0));
+    /// assert_eq!((spot.point, sampler.area()), (DVec3::new(0.25, 1.8, 0.0), 2.0));
     /// # Ok::<(), rt_shapes::MeshError>(())
     /// ```
     pub fn area(&self) -> f64 {

@@ -1,5 +1,8 @@
 //! Quadrics against exact arithmetic, finite differences and quadrature.
 
+// The long tests, run by hand, say what they found.
+#![allow(clippy::print_stdout)]
+
 mod corners;
 mod frustum;
 mod judge;
