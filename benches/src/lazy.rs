@@ -4,7 +4,7 @@
 //! the last ray; and then rays alone, when everything they need has been refined.
 
 use crate::contest::{Group, Measured, Mismatch, Weigh, mark_front};
-use crate::patches::{newell, nobody_missed};
+use crate::patches::nobody_missed;
 use crate::{Effort, Trouble, Watch, hear};
 use core::hint::black_box;
 use rt_accel::{Aggregate, BuildError, Hit, Member, Primitive};
@@ -70,8 +70,8 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
     let surfaces: Vec<Tessellation> = (0..SIDE * SIDE)
         .map(|k| {
             let at = DVec3::new((k % SIDE) as f64 * 8.0, (k / SIDE) as f64 * 6.0, 0.0);
-            let moved = |net: &[DVec3; 16]| BezierPatch::new(net.map(|p| p + at)).ok();
-            Tessellation { patches: newell().iter().filter_map(moved).collect(), segments: SEGMENTS }
+            let moved = |net: [DVec3; 16]| BezierPatch::new(net.map(|p| p + at)).ok();
+            Tessellation { patches: rt_scenes::teapot_nets().filter_map(moved).collect(), segments: SEGMENTS }
         })
         .collect();
     // The first row: chords of its box, which stay near it for the length that counts.

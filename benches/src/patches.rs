@@ -19,18 +19,6 @@ use std::time::Instant;
 /// Segments that are swept.
 const SEGMENTS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 
-/// Newell's teapot: 32 nets of control points.
-pub(crate) fn newell() -> Vec<[DVec3; 16]> {
-    let text = include_str!("../../assets/meshes/teapot-patches.txt");
-    let numbers =
-        |line: &str| line.split_whitespace().filter_map(|word| word.parse().ok()).collect::<Vec<f64>>();
-    let lines: Vec<Vec<f64>> = text.lines().filter(|line| !line.starts_with('#')).map(numbers).collect();
-    let vertices: Vec<DVec3> =
-        lines.iter().filter(|line| line.len() == 3).map(|line| DVec3::from_slice(line)).collect();
-    let nets = lines.iter().filter(|line| line.len() == 16);
-    nets.map(|line| core::array::from_fn(|k| vertices[line[k] as usize - 1])).collect()
-}
-
 /// No errors in as many rays.
 pub(crate) fn nobody_missed(rays: usize) -> HitError {
     HitError { rays: rays as u64, ..HitError::default() }
@@ -146,7 +134,7 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
     hear(watch, 0, 3)?;
     let params = BvhParams::default();
     let patches: Vec<BezierPatch> =
-        newell().into_iter().filter_map(|net| BezierPatch::new(net).ok()).collect();
+        rt_scenes::teapot_nets().filter_map(|net| BezierPatch::new(net).ok()).collect();
     let count = patches.len();
     // One patch a leaf: a patch costs as much as some tens of nodes.
     let alone = BvhParams { leaf_prims: 1, ..params };

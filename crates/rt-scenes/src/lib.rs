@@ -43,4 +43,5 @@ pub use facet::Facet;
 pub use placed::Placed;
 pub use scene::{Light, Material, Scene, SceneError, SceneGeometry, View, about, by_name, names};
 pub use solid::Solid;
+pub use teapot::teapot_nets;
 pub use trial::{Closed, Trial, closed_meshes, fine_trials, trials};

@@ -7,11 +7,6 @@ use crate::numbers::mesh;
 use rt_geom::glam::DVec3;
 use rt_shapes::TriangleMesh;
 
-/// The control points of each patch, as [`BezierPatch::new`](rt_shapes::BezierPatch::new) takes them.
-pub(crate) fn patches() -> impl Iterator<Item = [DVec3; 16]> {
-    PATCHES.into_iter().map(|patch| patch.map(|i| DVec3::from_array(VERTICES[usize::from(i) - 1])))
-}
-
 /// The pot as triangles of `f64`: each patch on a grid of `n x n` squares, two triangles each, and none where a side of a patch is
 /// a point: `64 n^2 - 8 n` triangles for `n` from 1.
 ///
@@ -36,12 +31,31 @@ pub(crate) fn smooth(n: u32) -> TriangleMesh<f64> {
     mesh.with_normals(normals).expect("one for each point")
 }
 
+/// The 32 bicubic Bézier patches that the Utah teapot is, as nets of control points, row by row: rim, body, handle, spout, lid and
+/// bottom. Lid and bottom have a row that is one point.
+///
+/// z is up, the length along x is 6.43, the bottom is at 0. What `dS/du x dS/dv` points to is inside.
+///
+/// ```
+/// use rt_shapes::{BezierPatch, PatchError};
+/// let patches: Vec<BezierPatch> = rt_scenes::teapot_nets().map(BezierPatch::new).collect::<Result<_, PatchError>>()?;
+/// assert_eq!(patches.len(), 32);
+/// assert!((patches[20].point(0.0, 0.3).z - 3.15).abs() < 1e-15); // the top of the lid
+/// # Ok::<(), PatchError>(())
+/// ```
+///
+/// Source: M. Newell, thesis, University of Utah, 1975; F. Crow, "The origins of the teapot", *IEEE Computer Graphics and
+/// Applications* 7(1), 1987, 8-19, with his bottom.
+pub fn teapot_nets() -> impl Iterator<Item = [DVec3; 16]> {
+    PATCHES.iter().map(|patch| patch.map(|i| DVec3::from_array(VERTICES[usize::from(i) - 1])))
+}
+
 /// `value` at the grid points of all patches, and the triangles between those points, by number.
 fn grid(n: u32, value: impl Fn(&[DVec3; 16], f64, f64) -> DVec3) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let mut values = Vec::with_capacity(32 * (n as usize + 1).pow(2));
     let mut triangles = Vec::with_capacity(64 * (n as usize).pow(2));
     let at = |i: u32| f64::from(i) / f64::from(n);
-    for net in patches() {
+    for net in teapot_nets() {
         // Rows that are one point: their triangles have two corners there, and are none.
         let tip = |i: u32| {
             let row = &net[12 * i as usize..][..4];

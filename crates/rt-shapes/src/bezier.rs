@@ -13,7 +13,7 @@ use crate::{Partials, Shape, Surface, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Counts, Hit, Primitive, WorldBound};
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::{DVec2, DVec3};
 use rt_geom::{Ray, Real, gamma};
 use search::{Frame, Next, Search};
@@ -27,7 +27,8 @@ use search::{Frame, Next, Search};
 /// share the control points of a border leave no crack between them: each is closed.
 ///
 /// Rounding means some `2^-50` of the larger of the patch's coordinates and the distance of the ray's origin: within that of the
-/// outline or of an open border a hit may be made up. Meetings that lie within each other's [error](PatchRoot::error) are one
+/// outline or of an open border a hit may be made up; never beyond `2^-45` of its size from the box of the patch, so that every
+/// structure finds the same hits. Meetings that lie within each other's [error](PatchRoot::error) are one
 /// to [`Primitive::all_hits`]. A ray that runs along the patch for a stretch meets it at the near end.
 ///
 /// Edges may be points (the lid of the teapot), control points may coincide, surfaces may fold and cross themselves. Cost: some
@@ -105,7 +106,7 @@ impl BezierPatch {
         let (min, max) = bounds(&control, BOUND_LEVELS);
         let slack = size * gamma(8 * BOUND_LEVELS);
         let whole = control.iter().fold((control[0], control[0]), |(l, h), &p| (l.min(p), h.max(p)));
-        let (min, max) = ((min - slack).max(whole.0), (max + slack).min(whole.1));
+        let [min, max] = roomy((min - slack).max(whole.0), (max + slack).min(whole.1), size);
         Ok(BezierPatch { control, min, max, size })
     }
 
@@ -180,10 +181,13 @@ impl BezierPatch {
     }
 
     #[inline]
-    fn search(&self, ray: &Ray<f64>, counts: &mut PatchCounts, each: impl FnMut(PatchRoot) -> Next) {
-        if let Some(frame) = Frame::new(ray, self.size) {
-            Search::run(&frame, &frame.piece(&self.control), ray, counts, each);
-        }
+    fn search(&self, ray: &Ray<f64>, counts: &mut PatchCounts, mut each: impl FnMut(PatchRoot) -> Next) {
+        let bound = DAabb { min: self.min, max: self.max };
+        let (Some(held), Some(frame)) = (Held::new(bound, ray, counts), Frame::new(ray, self.size)) else {
+            return;
+        };
+        let piece = frame.piece(&self.control);
+        Search::run(&frame, &piece, &held.search, counts, |root| each(held.hold(root)));
     }
 
     fn closest<R: Real>(&self, ray: &Ray<R>, counts: &mut PatchCounts) -> Option<Hit<Uv, R>> {
@@ -305,6 +309,44 @@ fn apart(mut roots: Vec<PatchRoot>, ray: &Ray<f64>) -> Vec<PatchRoot> {
         ..root
     };
     apart.into_iter().map(stretch).filter(|root| ray.contains(root.t)).collect()
+}
+
+/// A box with room for what rounding makes of rays that are aimed at its faces from some tens of times its size.
+fn roomy(min: DVec3, max: DVec3, size: f64) -> [DVec3; 2] {
+    let room = size * (2f64).powi(-45);
+    [(min - room).max(DVec3::MIN), (max + room).min(DVec3::MAX)]
+}
+
+/// Where hits of a patch lie: in its box.
+///
+/// What rounding makes up beside a patch may lie beside its box, which a structure passes over where the ray does not meet it. So
+/// whether it does is decided exactly, and hits are held within: then every structure finds the same.
+struct Held {
+    near: f64,
+    far: f64,
+    /// The ray to search along: one that starts before the box and ends behind it starts and ends nowhere, so that what is found
+    /// does not depend on where exactly.
+    search: Ray<f64>,
+}
+
+impl Held {
+    /// `None` if the line of the ray does not meet the box within the ray's interval.
+    fn new(bound: DAabb, ray: &Ray<f64>, counts: &mut PatchCounts) -> Option<Held> {
+        let Some([near, far]) = bound.span(&ray.between(f64::NEG_INFINITY, f64::INFINITY)) else {
+            counts.pieces += 1;
+            return None;
+        };
+        let t_min = if ray.t_min <= near { f64::NEG_INFINITY } else { ray.t_min };
+        let t_max = if ray.t_max >= far { f64::INFINITY } else { ray.t_max };
+        (ray.t_max >= near && ray.t_min <= far).then(|| Held { near, far, search: ray.between(t_min, t_max) })
+    }
+
+    /// The same, in the box: a bound on the error stays one, for what was exact was there.
+    fn hold(&self, root: PatchRoot) -> PatchRoot {
+        // NaN stays NaN.
+        let t = if root.t < self.near { self.near } else { root.t };
+        PatchRoot { t: if t > self.far { self.far } else { t }, ..root }
+    }
 }
 
 /// The ray in `f64`, reaching as far as numbers that round to its end.

@@ -57,7 +57,7 @@ pub use loop_subdivision::{
     Boundaries, Corners, Deviation, LimitPoint, LoopError, LoopRules, LoopSurface, LoopTessellation,
     Vertices, Weights,
 };
-pub use mesh::{AreaSample, Component, Facing, MeshError, MeshSampler, Orientation, TriangleMesh};
+pub use mesh::{Component, Facing, MeshError, MeshSampler, Orientation, TriangleMesh};
 pub use polygon::{Polygon, PolygonError};
 pub use quadric::{Disk, Frustum, Quadric, QuadricError, Root};
 pub use refine::{Lazy, Refine};

@@ -3,7 +3,7 @@
 mod area;
 mod orientation;
 
-pub use area::{AreaSample, MeshSampler};
+pub use area::MeshSampler;
 pub use orientation::{Component, Facing, Orientation};
 
 use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};

@@ -12,6 +12,7 @@ mod sweep;
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use revolved::Quadric;
+pub(crate) use sweep::share;
 
 use core::fmt;
 use rt_geom::expansion::two_sum;
@@ -46,7 +47,7 @@ pub enum QuadricError {
         /// The upper end, as given.
         max: f64,
     },
-    /// A range of angles that is empty, inverted, not finite, or more than a full turn.
+    /// A range of angles that is empty or narrower than rounding, inverted, not finite, or more than a full turn.
     Sweep {
         /// The first angle, in radians.
         from: f64,

@@ -1,7 +1,9 @@
 //! [`Sphere`]: full spheres.
 
 use crate::clip::sphere_avoids;
+use crate::quadric::share;
 use crate::{Partials, Shape, Surface, Uv};
+use core::f64::consts::{PI, TAU};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Hit, Primitive, WorldBound};
@@ -261,7 +263,9 @@ impl<R: Real> Primitive<R> for Sphere {
 }
 
 impl<R: Real> Shape<R> for Sphere {
-    /// The point is carried onto the sphere (Pharr et al. 2023, section 6.8.4); `uv` are longitude and latitude in `[0, 1]`.
+    /// The point is carried onto the sphere (Pharr et al. 2023, section 6.8.4). `uv` are those of
+    /// [`Quadric::sphere`](crate::Quadric::sphere): `u` goes counter-clockwise around the z axis from x, `v` from the lowest
+    /// point to the highest, both evenly by angle.
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
         let wide = ray.widen();
         let rough = wide.at(hit.t.into()) - self.center;
@@ -270,9 +274,9 @@ impl<R: Real> Shape<R> for Sphere {
         let offset = normal * self.radius;
         let point = self.center + offset;
         let error = (offset.abs() * 2.0 + point.abs()) * gamma(5);
-        let longitude = normal.y.atan2(normal.x) / std::f64::consts::TAU;
-        let uv =
-            DVec2::new(longitude.rem_euclid(1.0), normal.z.clamp(-1.0, 1.0).acos() / std::f64::consts::PI);
+        // Neither cancels near the poles, as an arc cosine would.
+        let around = share([0.0, TAU], normal.truncate());
+        let uv = DVec2::new(around, normal.truncate().length().atan2(-normal.z) / PI);
         Surface { point, error, normal, shading: normal, uv }
     }
 
@@ -280,8 +284,8 @@ impl<R: Real> Shape<R> for Sphere {
         let normal = self.surface(ray, hit).normal;
         let across = normal.truncate().length();
         let (x, y) = if across > 0.0 { (normal.x / across, normal.y / across) } else { (1.0, 0.0) };
-        let dndu = DVec3::new(-normal.y, normal.x, 0.0) * std::f64::consts::TAU;
-        let dndv = DVec3::new(x * normal.z, y * normal.z, -across) * std::f64::consts::PI;
+        let dndu = DVec3::new(-normal.y, normal.x, 0.0) * TAU;
+        let dndv = DVec3::new(-x * normal.z, -y * normal.z, across) * PI;
         Partials { dpdu: dndu * self.radius, dpdv: dndv * self.radius, dndu, dndv }
     }
 }

@@ -31,13 +31,19 @@ pub struct Surface {
     pub uv: DVec2,
 }
 
+/// Two numbers to sample by, moved into `[0, 1]`; NaN to 0.
+pub(crate) fn unit(xi: DVec2) -> DVec2 {
+    let inside = |x: f64| if x > 0.0 { x.min(1.0) } else { 0.0 };
+    DVec2::new(inside(xi.x), inside(xi.y))
+}
+
 /// `2^-60`.
 const STEP: f64 = f64::EPSILON / 256.0;
 
 impl Surface {
     /// A ray leaving the surface towards `dir`, for `t` in `[0, inf]`: its origin lies off the surface, on the side `dir`
     /// points to, by no more than the point's error and one unit in the last place. It does not meet this surface at its
-    /// start.
+    /// start, unless the surface bends within that unit: rays of `f32` want shapes larger than what `f32` tells apart there.
     ///
     /// Source: Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed. (2023), section 6.8.6.
     pub fn spawn<V: Vector>(&self, dir: V) -> Ray<V::Real> {

@@ -14,15 +14,7 @@ use rt_shapes::{BezierPatch, PatchCounts, PatchRoot, Refine, Shape, Tessellation
 type Net = [DVec3; 16];
 
 fn teapot() -> Vec<Net> {
-    let text = include_str!("../../../assets/meshes/teapot-patches.txt");
-    let lines: Vec<Vec<f64>> = text
-        .lines()
-        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
-        .map(|line| line.split_whitespace().map(|word| word.parse().unwrap()).collect())
-        .collect();
-    let (patches, vertices) = lines.split_at(32);
-    let vertex = |number: f64| DVec3::from_slice(&vertices[number as usize - 1]);
-    patches.iter().map(|line| core::array::from_fn(|k| vertex(line[k]))).collect()
+    rt_scenes::teapot_nets().collect()
 }
 
 fn patch(net: &Net) -> BezierPatch {

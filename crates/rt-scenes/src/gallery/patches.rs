@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// For size 0 and beyond size 32.
 pub fn patches(size: u32) -> Result<Scene, SceneError> {
     let n = sized("patches", size, 1, 32)?;
-    let pot: Vec<Arc<dyn Shape<f64, At = Uv>>> = teapot::patches()
+    let pot: Vec<Arc<dyn Shape<f64, At = Uv>>> = teapot::teapot_nets()
         .map(|net| {
             // The parameters of the pot turn right seen from outside; normals shall point there.
             let patch = BezierPatch::new(net).expect("a generator's patch").flipped();

@@ -2,11 +2,11 @@
 
 use super::net::{Piece, U};
 use super::search::{Frame, Next, Search};
-use super::{BezierPatch, PatchCounts, PatchError, PatchRoot, apart, hit, reaching};
+use super::{BezierPatch, Held, PatchCounts, PatchError, PatchRoot, apart, hit, reaching, roomy};
 use crate::{Partials, Shape, Surface, Uv};
 use core::ops::ControlFlow;
 use rt_accel::{Counts, Hit, Primitive, WorldBound};
-use rt_bounds::Aabb;
+use rt_bounds::{Aabb, DAabb};
 use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
 
@@ -89,7 +89,7 @@ impl BilinearPatch {
 
     fn extent(&self) -> [DVec3; 2] {
         let [a, b, c, d] = self.corners;
-        [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
+        roomy(a.min(b).min(c.min(d)), a.max(b).max(c.max(d)), self.size)
     }
 
     /// The area, as [`BezierPatch::area`] finds it.
@@ -109,7 +109,12 @@ impl BilinearPatch {
     }
 
     fn search(&self, ray: &Ray<f64>, counts: &mut PatchCounts, mut each: impl FnMut(PatchRoot) -> Next) {
-        let Some(frame) = Frame::new(ray, self.size) else { return };
+        let [min, max] = self.extent();
+        let (Some(held), Some(frame)) =
+            (Held::new(DAabb { min, max }, ray, counts), Frame::new(ray, self.size))
+        else {
+            return;
+        };
         let [a, b, c, d] = self.corners;
         // Only the corners count for the quadratic; the rest is filled in when there is something to be found.
         let mut piece = frame.piece(&core::array::from_fn(|k| match k {
@@ -129,14 +134,14 @@ impl BilinearPatch {
             if found.iter().flatten().all(Option::is_some) {
                 for root in found.into_iter().flatten().flatten() {
                     counts.roots += 1;
-                    if let Next::Stop = each(root) {
+                    if let Next::Stop = each(held.hold(root)) {
                         return;
                     }
                 }
                 return;
             }
         }
-        Search::run(&frame, &piece, ray, counts, each);
+        Search::run(&frame, &piece, &held.search, counts, |root| each(held.hold(root)));
     }
 
     fn closest<R: Real>(&self, ray: &Ray<R>, counts: &mut PatchCounts) -> Option<Hit<Uv, R>> {

@@ -1,11 +1,12 @@
 //! Areas, and points spread evenly by area.
 
 use super::TriangleMesh;
+use crate::surface::unit;
 use crate::triangle::{exact_cross, power_of_two};
-use crate::{Surface, Triangle, Uv};
+use crate::{Surface, Triangle};
 use rt_geom::Real;
 use rt_geom::expansion::{DoubleDouble, Expansion, two_sum};
-use rt_geom::glam::DVec3;
+use rt_geom::glam::{DVec2, DVec3};
 
 const U: f64 = f64::EPSILON / 2.0;
 
@@ -105,13 +106,14 @@ impl<V: Real> TriangleMesh<V> {
     /// Error: 0.51 units in the last place of each triangle's, and one rounding.
     ///
     /// ```
+    /// use rt_geom::glam::{DVec2, DVec3};
     /// use rt_shapes::TriangleMesh;
     /// let corners = vec![[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 2.0, 0.0]];
     /// let mesh = TriangleMesh::new(corners, vec![[0, 1, 2], [0, 2, 3], [0, 1, 1]])?;
     /// assert_eq!((mesh.area(), mesh.degenerate()), (2.0, 1));
     /// let sampler = mesh.sampler().unwrap();
-    /// let sample = sampler.sample([0.75, 0.3, 0.9]);
-    /// assert_eq!((sample.at.prim, sample.pdf), (1, 0.5));
+    /// let spot = sampler.sample(DVec2::new(0.75, 0.9));
+    /// assert_eq!((spot.point, sampler.area()), (DVec3::new(0.25, 1.8, 0.0), 2.0));
     /// # Ok::<(), rt_shapes::MeshError>(())
     /// ```
     pub fn area(&self) -> f64 {
@@ -148,33 +150,33 @@ pub struct MeshSampler<'a, V: Real = f32> {
     area: f64,
 }
 
-/// A point picked on a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AreaSample {
-    /// Where it is.
-    pub at: Uv,
-    /// The surface there.
-    pub surface: Surface,
-    /// The probability density by area: one over the area of the surface.
-    pub pdf: f64,
-}
-
 impl<V: Real> MeshSampler<'_, V> {
-    /// The point that belongs to these numbers in `[0, 1)`: the first picks the triangle, the others a point of it. Evenly
-    /// spread numbers give evenly spread points, near ones near points. Numbers outside are moved to the nearest inside.
+    /// The area of all triangles: points are picked at density `1 / area`.
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`, as
+    /// [`Quadric::sample`](crate::Quadric::sample). Numbers outside are moved to the nearest inside, NaN to 0.
     ///
-    /// Triangles without area are never picked. Cost: `O(log n)`.
+    /// The first number picks the triangle, and what it leaves of its digits places the point there with the second: evenly spread
+    /// numbers give evenly spread points. Triangles without area are never picked. Cost: `O(log n)`.
     ///
     /// Source: Heitz, "A low-distortion map between triangle and square" (2019).
-    pub fn sample(&self, numbers: [f64; 3]) -> AreaSample {
-        let below_one = 1.0f64.next_down();
-        // NaN becomes 0.
-        let [pick, x, y] = numbers.map(|x| x.max(0.0).min(below_one));
+    pub fn sample(&self, xi: DVec2) -> Surface {
+        let (prim, weights) = self.place(xi);
+        self.mesh.surface_at(prim, weights)
+    }
+
+    /// The triangle and the weights of its corners.
+    fn place(&self, xi: DVec2) -> (u32, [f64; 3]) {
+        let DVec2 { x: pick, y } = unit(xi);
         let reach = (pick * self.area).min(self.area.next_down());
-        let prim = self.ends.partition_point(|&end| end <= reach) as u32;
+        let prim = self.ends.partition_point(|&end| end <= reach);
+        let start = if prim == 0 { 0.0 } else { self.ends[prim - 1] };
+        let x = (reach - start) / (self.ends[prim] - start);
         let (u, v) = if y > x { (x * 0.5, y - x * 0.5) } else { (x - y * 0.5, y * 0.5) };
-        let surface = self.mesh.surface_at(prim, [(1.0 - u) - v, u, v]);
-        AreaSample { at: Uv { prim, u: u as f32, v: v as f32 }, surface, pdf: 1.0 / self.area }
+        (prim as u32, [(1.0 - u) - v, u, v])
     }
 }
 
@@ -224,25 +226,27 @@ mod tests {
         let sampler = mesh.sampler().unwrap();
         let mut counts = [0; 5];
         let mut mean = [DVec3::ZERO; 5];
-        let n = 40;
-        for k in 0..n * n * n {
+        let n = 256;
+        for k in 0..n * n {
             let at = |i: usize| (i % n) as f64 / n as f64 + 0.5 / n as f64;
-            let sample = sampler.sample([at(k), at(k / n), at(k / n / n)]);
-            assert_eq!(sample.pdf, 0.125);
-            assert!(sample.surface.point.cmpge(DVec3::ZERO).all());
-            counts[sample.at.prim as usize] += 1;
-            mean[sample.at.prim as usize] += sample.surface.point;
+            let xi = DVec2::new(at(k), at(k / n));
+            let (prim, point) = (sampler.place(xi).0 as usize, sampler.sample(xi).point);
+            assert!(point.cmpge(DVec3::ZERO).all());
+            counts[prim] += 1;
+            mean[prim] += point;
         }
-        assert_eq!(counts, [0, n * n * n / 4, 0, n * n * n * 3 / 4, 0]);
+        assert_eq!((counts, sampler.area()), ([0, n * n / 4, 0, n * n * 3 / 4, 0], 8.0));
         for (prim, centre) in
             [(1, DVec3::new(4.0 / 3.0, 1.0 / 3.0, 0.0)), (3, DVec3::new(4.0 / 3.0, 1.0, 0.0))]
         {
             // On the diagonal of the square the map has its fold: the mean of a grid is off by half a cell there.
-            assert!((mean[prim] / counts[prim] as f64 - centre).length() < 1.0 / n as f64);
+            assert!((mean[prim] / counts[prim] as f64 - centre).length() < 8.0 / n as f64);
         }
-        for numbers in [[1.0; 3], [f64::NAN; 3], [-3.0, 2.0, f64::INFINITY]] {
-            let sample = sampler.sample(numbers);
-            assert!(sample.surface.point.is_finite() && [1, 3].contains(&sample.at.prim));
+        for xi in
+            [DVec2::ONE, DVec2::NAN, DVec2::new(-3.0, 2.0), DVec2::new(f64::INFINITY, f64::NEG_INFINITY)]
+        {
+            let prim = sampler.place(xi).0;
+            assert!(sampler.sample(xi).point.is_finite() && [1, 3].contains(&prim));
         }
         let flat = TriangleMesh::new(vec![[0.0f32; 3]; 3], vec![[0, 1, 2]]).unwrap();
         assert!(flat.sampler().is_none() && flat.area() == 0.0);

@@ -3,6 +3,7 @@
 use super::form::Number;
 use super::sweep::{Sweep, arc, direction, share};
 use super::{LARGEST, QuadricError};
+use crate::surface::unit;
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::TAU;
 use core::ops::ControlFlow;
@@ -72,10 +73,11 @@ impl Disk {
     }
 
     /// Only the part from one angle counter-clockwise to another, in radians from the x axis; at most a full turn.
+    /// Both ends belong to it, as those of a [`Quadric`](crate::Quadric).
     ///
     /// # Errors
     ///
-    /// When the range is empty, inverted, not finite or more than a turn.
+    /// When the range is empty, or narrower than rounding, inverted, not finite or more than a turn.
     pub fn swept(self, from: f64, to: f64) -> Result<Disk, QuadricError> {
         Ok(Disk { angles: [from, to], sweep: Sweep::new([from, to])?, ..self })
     }
@@ -85,8 +87,10 @@ impl Disk {
         0.5 * (self.angles[1] - self.angles[0]) * (self.outer - self.inner) * (self.outer + self.inner)
     }
 
-    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`.
+    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`. Numbers
+    /// outside are moved to the nearest inside, NaN to 0.
     pub fn sample(&self, xi: DVec2) -> Surface {
+        let xi = unit(xi);
         let [a, b] = [self.outer * self.outer, self.inner * self.inner];
         let radius = (a + (b - a) * xi.y).max(b).sqrt().clamp(self.inner, self.outer);
         self.record(direction(self.angles[0] + (self.angles[1] - self.angles[0]) * xi.x) * radius)

@@ -5,6 +5,7 @@ use super::solve;
 use super::sweep::Sweep;
 use super::{LARGEST, QuadricError, Root, surface};
 use crate::clip::frustum_avoids;
+use crate::surface::unit;
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::{PI, TAU};
 use core::ops::ControlFlow;
@@ -145,8 +146,10 @@ impl Frustum {
         PI * (r0 + r1) * self.rise().length().hypot(r1 - r0)
     }
 
-    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`.
+    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`. Numbers
+    /// outside are moved to the nearest inside, NaN to 0.
     pub fn sample(&self, xi: DVec2) -> Surface {
+        let xi = unit(xi);
         let [r0, r1] = self.radii;
         let radius = (r0 * r0 + (r1 * r1 - r0 * r0) * xi.y).max(0.0).sqrt();
         let v = (xi.y * (r0 + r1) / (r0 + radius)).clamp(0.0, 1.0);

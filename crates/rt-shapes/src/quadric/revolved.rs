@@ -4,6 +4,7 @@ use super::form::{Extent, Form, Number, Terms};
 use super::partials::weingarten;
 use super::sweep::{Sweep, arc, direction, share};
 use super::{LARGEST, QuadricError, Root, solve, surface};
+use crate::surface::unit;
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::TAU;
 use core::ops::ControlFlow;
@@ -34,8 +35,10 @@ use rt_geom::{Ray, Real};
 /// that may lie on a border by twice the digits does; a distance that may be 0 is. A line that lies in the surface does not
 /// meet it.
 ///
-/// The ends of a sweep are the directions that `cos` and `sin` of the angles round to. Sizes, distances and components of
-/// directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e290`;
+/// The ends of a sweep belong to it. They are the directions that `cos` and `sin` of the angles round to; the axes within `2^-50`
+/// of a turn of quarter turns, up to two turns. So parts of a turn that abut lose nothing of the whole between them, also where
+/// it closes: as from 0 to `PI` and on to `TAU`. Other ends outside of `[0, TAU)` reach `2^-49` of the angle, or of a turn,
+/// further: such a number may be another with a turn added, which rounds. Sizes, distances and components of directions may span `2^150`; beyond, all is rounded as `f64` rounds. Sizes end at `1e290`;
 /// [`Surface`] records and areas want sizes from `1e-70` to `1e70`.
 ///
 /// Source: the parametrisations: Pharr and Humphreys, *Physically Based Rendering* (2004), sections 3.2 to 3.5; double-double
@@ -182,11 +185,11 @@ impl Quadric {
     }
 
     /// Only the part from one angle counter-clockwise to another, in radians from the x axis (of a hyperboloid: from its segment);
-    /// at most a full turn.
+    /// at most a full turn. Both ends belong to it.
     ///
     /// # Errors
     ///
-    /// When the range is empty, inverted, not finite or more than a turn.
+    /// When the range is empty, or narrower than rounding, inverted, not finite or more than a turn.
     pub fn swept(self, from: f64, to: f64) -> Result<Quadric, QuadricError> {
         Ok(Quadric { angles: [from, to], sweep: Sweep::new([from, to])?, ..self })
     }
@@ -332,10 +335,12 @@ impl Quadric {
         0.5 * (line + bend)
     }
 
-    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`.
+    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`. Numbers
+    /// outside are moved to the nearest inside, NaN to 0.
     pub fn sample(&self, xi: DVec2) -> Surface {
+        let xi = unit(xi);
         let [low, high] = self.z;
-        let share = xi.y.clamp(0.0, 1.0);
+        let share = xi.y;
         let z = match self.kind {
             Kind::Sphere { .. } | Kind::Cylinder { .. } => low + (high - low) * share,
             // The area grows with z: halve until it fits. The density is continuous, so sixty steps leave nothing.
@@ -387,10 +392,11 @@ impl Quadric {
         let (dpdu, inward) = (around(p), (-p * (range * range)).extend(0.0));
         // The derivative along v, and the second one; that along both is the former turned.
         let (dpdv, bent) = match self.kind {
-            Kind::Sphere { .. } => {
+            Kind::Sphere { radius } => {
                 let [low, high] = self.polar();
-                let range = high - low;
-                ((out * point.z).extend(-rho) * range, -point * (range * range))
+                let dpdv = (out * point.z).extend(-rho) * (high - low);
+                // The normal is the point, over the radius: at the poles, too.
+                return Partials { dpdu, dpdv, dndu: dpdu / radius, dndv: dpdv / radius };
             }
             Kind::Cylinder { .. } => (DVec3::Z * rise, DVec3::ZERO),
             Kind::Cone { height, radius } => ((out * (-radius / height)).extend(1.0) * rise, DVec3::ZERO),

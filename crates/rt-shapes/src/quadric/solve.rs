@@ -237,21 +237,26 @@ fn candidates_wide<F: Form>(
 /// Newton's steps on `f` evaluated with twice the digits, until they no longer matter.
 ///
 /// On a quadratic, `e` away from a root, a step `f / f'` leaves `a e^2 / f'`; and `e` is at most two steps while
-/// `4 |a f| <= f'^2`. So each step tells what error it leaves; they end when that is below `goal` times the root.
+/// `4 |a f| <= f'^2`. So each step tells what error it leaves; they end when that is below `goal` times the root. Between steps
+/// the root keeps all its digits: far from the origin, what `f64` drops of it is much to the surface.
 #[inline(never)]
-fn polish<F: Form>(form: &F, o: DVec3, d: DVec3, mut t: f64, goal: f64) -> Option<Candidate> {
+fn polish<F: Form>(form: &F, o: DVec3, d: DVec3, candidate: &Candidate, goal: f64) -> Option<Candidate> {
+    if candidate.digits == Digits::Touching {
+        return None;
+    }
     let anchor = form.extent().anchor;
     let (signs, slope) = (form.signs(), form.slope());
     let v = form.linear::<DoubleDouble>(d.to_array().map(DoubleDouble::from));
     let fast = v.squares.map(DoubleDouble::value);
     let a = signed(signs, &fast, &fast);
+    let mut t = candidate.t;
     for round in 0..6 {
-        let w = offset(anchor, o, d, DoubleDouble::from(t));
+        let w = offset(anchor, o, d, t);
         let u = form.at(w);
         let f = (signed(signs, &u.squares, &u.squares) - slope * u.axial).value();
         let derivative =
             2.0 * signed(signs, &u.squares.map(DoubleDouble::value), &fast) - slope.value() * v.axial.value();
-        let (eta, _) = uncertain::<DoubleDouble, F>(form, &w, o, d, t);
+        let (eta, _) = uncertain::<DoubleDouble, F>(form, &w, o, d, t.value());
         let (us, vs) = (size(&u), fast.iter().map(|x| x.abs()).sum::<f64>());
         let off = 3.0 * us * eta + 4.0 * eta * eta + 2.0 * slope.value().abs() * eta;
         let tilt = 16.0 * U * (us * vs + slope.value().abs() * v.axial.value().abs());
@@ -259,13 +264,15 @@ fn polish<F: Form>(form: &F, o: DVec3, d: DVec3, mut t: f64, goal: f64) -> Optio
         if !(4.0 * (a * f).abs() <= derivative * derivative && derivative.abs() > 2.0 * tilt) {
             return None;
         }
-        let next = DoubleDouble::from(t) - step.into();
+        t = t - step.into();
         let floor = 2.0 * off / derivative.abs();
         let left = (4.0 * a.abs() * step * step + 2.0 * tilt * step.abs()) / derivative.abs() + floor;
-        t = next.value();
-        if left <= goal * t.abs() || (left <= 2.0 * floor && round > 0) || round == 5 {
-            let rounded = 4.0 * DoubleDouble::U * t.abs();
-            return Some(Candidate { t: next, error: 2.0 * left + rounded, digits: Digits::Double });
+        if left <= goal * t.value().abs() || (left <= 2.0 * floor && round > 0) || round == 5 {
+            let rounded = 4.0 * DoubleDouble::U * t.value().abs();
+            let error = 2.0 * left + rounded;
+            // The root that was meant, and not its neighbour.
+            let same = (t - candidate.t).value().abs() <= candidate.error + error;
+            return same.then_some(Candidate { t, error, digits: Digits::Double });
         }
     }
     None
@@ -397,14 +404,12 @@ fn settle<F: Form, R: Real>(
         if (t - t_min).abs() > slack {
             return Some(Root { t, error: slack });
         }
-        let polished = if digits == Digits::Touching { None } else { polish(form, o, d, t, GOAL) };
-        let fine = polished.unwrap_or(candidate);
+        let fine = polish(form, o, d, &candidate, GOAL).unwrap_or(candidate);
         return (near_end(&fine, t_min) >= t_min).then(|| Root { t: t.max(t_min), error: slack });
     }
     // A decision left open wants all digits, not only those of the answer.
     let goal = if rough == Verdict::Inside { 0.125 * U } else { GOAL };
-    let polished = if digits == Digits::Touching { None } else { polish(form, o, d, t, goal) };
-    let mut fine = match polished {
+    let mut fine = match polish(form, o, d, &candidate, goal) {
         Some(fine) if digits == Digits::Single || fine.error < candidate.error => fine,
         _ if digits == Digits::Single => closest_wide(form, o, d, candidate),
         _ => candidate,

@@ -1,10 +1,15 @@
 //! [`Sweep`]: a range of angles about the axis, decided by signs.
 
 use super::QuadricError;
+use rt_geom::expansion::Expansion;
 use rt_geom::glam::DVec2;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// The angles from one direction counter-clockwise to another: less than a full turn.
+/// The angles from one direction counter-clockwise to another: less than a full turn, both ends included.
+///
+/// One angle has one direction, whichever end it is of; multiples of a quarter turn, up to rounding, have the axes. So parts that
+/// abut share their border bit for bit, and what is within rounding of it belongs to both. A number outside of `[0, 2 pi)` may be
+/// another's with turns added or taken away, which rounds: an end that has such a one lies further out by more than that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sweep {
     /// The directions it begins and ends with, of unit length up to rounding. They are what is meant, not the angles.
@@ -16,12 +21,22 @@ pub(super) struct Sweep {
 impl Sweep {
     /// From one angle to a larger one, at most a turn further; `None` for a full turn, up to the rounding of the angles.
     pub(super) fn new([from, to]: [f64; 2]) -> Result<Option<Sweep>, QuadricError> {
+        let none = Err(QuadricError::Sweep { from, to });
         let slack = 4.0 * f64::EPSILON * from.abs().max(to.abs()).max(TAU);
         if !(from.is_finite() && to - from > 0.0 && to - from <= TAU + slack) {
-            return Err(QuadricError::Sweep { from, to });
+            return none;
         }
-        let ends = [from, to].map(direction);
-        Ok((to - from < TAU - slack).then_some(Sweep { ends, reflex: to - from > PI }))
+        if to - from >= TAU - 8.0 * slack {
+            return Ok(None);
+        }
+        let ends = [end(from, -1.0), end(to, 1.0)];
+        // By the directions, which may be further apart than the angles, or less far.
+        let turn = cross(ends[0], ends[1]);
+        let reflex = if (to - from - PI).abs() < 1.0 { turn < 0 } else { to - from > PI };
+        if to - from < 1.0 && turn <= 0 {
+            return none;
+        }
+        Ok(Some(Sweep { ends, reflex }))
     }
 
     /// Whether a direction lies within, ends included.
@@ -31,13 +46,32 @@ impl Sweep {
     }
 }
 
+/// The direction that a sweep ends with, outward being `-1` or `1`.
+fn end(phi: f64, outward: f64) -> DVec2 {
+    let within = (0.0..TAU).contains(&phi);
+    // Half as far from an axis where turns may have been added to a number: so whichever has the axis, the one within has it.
+    let near = if within { 4.0 } else { 2.0 } * f64::EPSILON * TAU;
+    let quarter = (phi / FRAC_PI_2).round();
+    if phi.abs() <= 2.0 * TAU && (phi - quarter * FRAC_PI_2).abs() <= near {
+        return [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y][quarter.rem_euclid(4.0) as usize];
+    }
+    direction(if within { phi } else { phi + outward * 8.0 * f64::EPSILON * phi.abs().max(TAU) })
+}
+
+/// The sign of the cross product, exactly.
+fn cross(a: DVec2, b: DVec2) -> i32 {
+    let product = |x: f64, y: f64| -> Expansion<2> { Expansion::<1>::new(x).scaled(y) };
+    let difference: Expansion<4> = product(a.x, b.y).minus(&product(a.y, b.x));
+    difference.sign()
+}
+
 /// The direction at an angle.
 pub(super) fn direction(phi: f64) -> DVec2 {
     DVec2::new(phi.cos(), phi.sin())
 }
 
 /// Where `p` lies between two angles, from 0 to 1; outside, the nearer end.
-pub(super) fn share([from, to]: [f64; 2], p: DVec2) -> f64 {
+pub(crate) fn share([from, to]: [f64; 2], p: DVec2) -> f64 {
     let (start, range) = (direction(from), to - from);
     let phi = start.perp_dot(p).atan2(start.dot(p));
     let phi = if phi < 0.0 { phi + TAU } else { phi };

@@ -5,7 +5,7 @@ use rt_accel::Primitive;
 use rt_geom::glam::{DVec2, DVec3, Vec3A};
 use rt_geom::{Ray, Real};
 use rt_measure::rays::Seeded;
-use rt_shapes::{Disk, Frustum, Quadric, QuadricError, Sphere};
+use rt_shapes::{Disk, Frustum, Quadric, QuadricError, Shape, Sphere};
 use std::f64::consts::{PI, TAU};
 
 #[test]
@@ -126,6 +126,49 @@ fn one_surface_said_in_two_ways_is_one() {
         }
     }
     assert!(hits > 5000);
+}
+
+/// The two spheres describe each hit alike, wherever and however large they are, poles and seam included.
+#[test]
+fn both_spheres_have_the_same_parameters() {
+    let mut seeded = Seeded::new(14);
+    let mut hits = 0;
+    for case in 0..4000 {
+        let radius = 10f64.powf(seeded.between(-6.0, 6.0));
+        let (ball, whole) = (Sphere::new(DVec3::ZERO, radius).unwrap(), Quadric::sphere(radius).unwrap());
+        let target = match case % 8 {
+            // The poles, the seam on either side, the equator.
+            0 => DVec3::Z,
+            1 => DVec3::NEG_Z,
+            2 => DVec3::new(0.6, 0.0, 0.8),
+            3 => DVec3::new(0.6, -1e-14, 0.8),
+            4 => DVec3::new(0.6, -0.8, 0.0),
+            5 => DVec3::new(1e-12, -2e-12, 1.0),
+            _ => seeded.direction(),
+        };
+        let out = if case % 3 == 0 { target } else { seeded.direction() };
+        let out = if out.dot(target) < 0.0 { -out } else { out };
+        let ray = Ray::new((target + out * 3.0) * radius, -out * radius);
+        let (Some(a), Some(b)) = (ball.intersect(&ray), whole.intersect(&ray)) else { continue };
+        hits += 1;
+        let (s, q) = (ball.surface(&ray, &a), whole.surface(&ray, &b));
+        let (p, r) = (ball.partials(&ray, &a), whole.partials(&ray, &b));
+        // Beside the axis angles are as uncertain as the point over its distance from it.
+        let rho = s.normal.truncate().length();
+        let turn = 1e-14 / rho.max(1e-14);
+        let du = (s.uv.x - q.uv.x).abs();
+        assert!((0.0..=1.0).contains(&s.uv.x) && (0.0..=1.0).contains(&s.uv.y), "{ray:?} {s:?}");
+        assert!(du.min(1.0 - du) <= turn.min(0.5) && (s.uv.y - q.uv.y).abs() < 1e-14, "{ray:?} {s:?} {q:?}");
+        let close = |a: DVec3, b: DVec3, size: f64| (a - b).length() <= 1e-13 * size;
+        let bent = |a: DVec3, b: DVec3, size: f64| (a - b).length() <= (1e-13 + 8.0 * turn) * size;
+        assert!(close(s.point, q.point, radius) && close(s.normal, q.normal, 1.0), "{ray:?} {s:?} {q:?}");
+        assert!(close(p.dpdu, r.dpdu, radius) && bent(p.dpdv, r.dpdv, radius), "{ray:?} {p:?} {r:?}");
+        assert!(close(p.dndu, r.dndu, 1.0) && bent(p.dndv, r.dndv, 1.0), "{ray:?} {p:?} {r:?}");
+        // Both say what they mean: counter-clockwise and upward, which is dpdu x dpdv outward.
+        assert!(rho < 1e-9 || p.dpdu.cross(p.dpdv).dot(s.normal) > 0.0, "{ray:?} {p:?}");
+        assert!(p.dpdv.z >= 0.0 && p.dndv.length() > 3.0, "{ray:?} {p:?}");
+    }
+    assert!(hits > 3000);
 }
 
 fn narrow(ray: &Ray<f64>) -> Ray<f32> {

@@ -226,6 +226,22 @@ fn samples_are_uniform_by_area() {
 }
 
 #[test]
+fn any_numbers_pick_a_point() {
+    let (ring, cone) =
+        (Disk::ring(0.0, 1.0, 2.0).unwrap(), Frustum::cone(DVec3::ZERO, 1.0, DVec3::Z).unwrap());
+    let half = Quadric::sphere(1.0).unwrap().swept(0.0, PI).unwrap();
+    for wild in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -2.0, 7.0, 0.0, 1.0] {
+        for xi in [DVec2::new(wild, 0.5), DVec2::new(0.25, wild), DVec2::splat(wild)] {
+            let [x, y] = [xi.x, xi.y].map(|x| if x.is_nan() { 0.0 } else { x.clamp(0.0, 1.0) });
+            let inside = DVec2::new(x, y);
+            let (a, b, c) = (ring.sample(xi), cone.sample(xi), half.sample(xi));
+            assert_eq!((a, b, c), (ring.sample(inside), cone.sample(inside), half.sample(inside)));
+            assert!(a.point.is_finite() && b.point.is_finite() && c.point.y >= -1e-15, "{xi} {c:?}");
+        }
+    }
+}
+
+#[test]
 fn a_mirrored_surface_faces_outward_still() {
     let map = Transform::scale(DVec3::new(-1.0, 1.0, 2.0)).unwrap();
     let ball = Instance::new(Quadric::sphere(1.0).unwrap(), map);
