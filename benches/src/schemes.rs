@@ -291,8 +291,7 @@ mod tests {
                     ("empty cells", empty, known.empty, 0.005),
                 ] {
                     let off = is / was - 1.0;
-                    println!("{name} {} {what}: {is:.2}, known {was}, {:+.2} %", known.name, 100.0 * off);
-                    assert!(off.abs() <= most, "{name} {} {what}: {is} and {was}", known.name);
+                    assert!(off.abs() <= most, "{name} {} {what}: {is}, known {was}, {off:+.4}", known.name);
                 }
             }
         }
