@@ -77,6 +77,9 @@ impl<P: WorldBound, V: Send + Sync> WorldBound for Guarded<P, V> {
     fn bound_under(&self, map: &Transform) -> DAabb {
         self.inner.bound_under(map)
     }
+    fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+        self.inner.outline(origin)
+    }
 }
 
 impl<R: Real, P: Primitive<R>, V: BoundingVolume + Send + Sync> Primitive<R> for Guarded<P, V> {

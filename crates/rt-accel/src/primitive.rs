@@ -31,6 +31,12 @@ pub trait WorldBound: Send + Sync {
     fn bound_under(&self, map: &Transform) -> DAabb {
         self.world_bound().carried(map)
     }
+
+    /// The corners of a triangle that holds all of it, relative to `origin`, each coordinate rounded once; `None`, as the
+    /// default says, where a box must do. Structures that split space by the primitives' own planes ask for it.
+    fn outline(&self, _origin: DVec3) -> Option<[DVec3; 3]> {
+        None
+    }
 }
 
 /// Something a ray can hit, from any thread, in world space, by rays of precision `R`.
@@ -118,6 +124,9 @@ macro_rules! forward {
             }
             fn bound_under(&self, map: &Transform) -> DAabb {
                 (**self).bound_under(map)
+            }
+            fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+                (**self).outline(origin)
             }
         }
 

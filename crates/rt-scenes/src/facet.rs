@@ -79,6 +79,9 @@ impl WorldBound for Facet {
     fn world_bound_from(&self, origin: DVec3) -> Aabb {
         self.mesh.bound_from(self.number, origin)
     }
+    fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+        self.mesh.outline(self.number, origin)
+    }
 }
 
 impl<R: Real> Primitive<R> for Facet {

@@ -79,6 +79,9 @@ impl WorldBound for Solid {
     fn world_bound_from(&self, origin: DVec3) -> Aabb {
         each!(self, shape => shape.world_bound_from(origin))
     }
+    fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+        each!(self, shape => shape.outline(origin))
+    }
 }
 
 impl<R: Real> Primitive<R> for Solid {

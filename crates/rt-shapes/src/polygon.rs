@@ -147,6 +147,10 @@ impl WorldBound for Polygon {
     fn bound_under(&self, map: &Transform) -> DAabb {
         DAabb::around_carried(self.triangles.iter().flat_map(|t| t.corners), map)
     }
+    fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+        let [only] = *self.triangles else { return None };
+        Some(only.corners.map(|corner| corner - origin))
+    }
 }
 
 impl<R: Real> Primitive<R> for Polygon {
