@@ -42,10 +42,10 @@ impl Default for BspParams {
     fn default() -> BspParams {
         BspParams {
             sah: Sah { traverse: 1.0, intersect: 2.0 },
-            slanted: 1.5,
+            slanted: 1.25,
             exhaustive: 32,
             samples: 16,
-            empty_bonus: 0.2,
+            empty_bonus: 0.0,
             bad_splits: 0,
             max_depth: None,
             mailing: Mailing::None,

@@ -11,6 +11,8 @@ pub(crate) struct Cell {
     around: Vec<u32>,
     /// Where each face ends in `around`.
     ends: Vec<u32>,
+    /// Twice the area of each face as a vector, and its length.
+    vectors: Vec<(DVec3, f64)>,
     /// The sum of the areas of the faces.
     area: f64,
 }
@@ -19,7 +21,8 @@ impl Cell {
     pub(crate) fn of_box(b: &Aabb) -> Cell {
         let corners = b.corners().map(|c| c.as_dvec3()).to_vec();
         let around = vec![0, 4, 6, 2, 1, 3, 7, 5, 0, 1, 5, 4, 2, 6, 7, 3, 0, 2, 3, 1, 4, 5, 7, 6];
-        let mut cell = Cell { corners, around, ends: vec![4, 8, 12, 16, 20, 24], area: 0.0 };
+        let mut cell =
+            Cell { corners, around, ends: vec![4, 8, 12, 16, 20, 24], vectors: Vec::new(), area: 0.0 };
         cell.measure();
         cell
     }
@@ -35,7 +38,9 @@ impl Cell {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.corners.capacity() * size_of::<DVec3>() + (self.around.capacity() + self.ends.capacity()) * 4
+        self.corners.capacity() * size_of::<DVec3>()
+            + (self.around.capacity() + self.ends.capacity()) * 4
+            + self.vectors.capacity() * size_of::<(DVec3, f64)>()
     }
 
     fn faces(&self) -> impl Iterator<Item = &[u32]> {
@@ -44,13 +49,14 @@ impl Cell {
     }
 
     fn measure(&mut self) {
-        let about = self.corners.first().copied().unwrap_or(DVec3::ZERO);
-        let at = |i: u32| self.corners[i as usize] - about;
-        let area = |face: &[u32]| {
+        let at = |i: u32| self.corners[i as usize];
+        let vector = |face: &[u32]| {
             let first = at(face[0]);
-            face[1..].windows(2).map(|w| (at(w[0]) - first).cross(at(w[1]) - first)).sum::<DVec3>().length()
+            let sum: DVec3 = face[1..].windows(2).map(|w| (at(w[0]) - first).cross(at(w[1]) - first)).sum();
+            (sum, sum.length())
         };
-        self.area = self.faces().map(area).sum::<f64>() * 0.5;
+        self.vectors = self.faces().map(vector).collect();
+        self.area = self.vectors.iter().map(|(_, length)| length).sum::<f64>() * 0.5;
     }
 
     /// How far above the plane `normal . p = shift` each corner is, and the least and greatest of that.
@@ -65,37 +71,42 @@ impl Cell {
     /// What of the faces lies below is added up as vectors; since the vectors of a closed surface add to nothing, their sum is
     /// the cut itself, whose polygon need not be put together.
     pub(crate) fn areas(&self, heights: &[f64]) -> [f64; 2] {
-        let about = self.corners[0];
         let (mut below, mut above, mut open) = (0.0, 0.0, DVec3::ZERO);
-        for face in self.faces() {
-            let (mut first, mut last) = (None::<DVec3>, DVec3::ZERO);
-            let (mut low, mut all) = (DVec3::ZERO, DVec3::ZERO);
+        for (face, &(all, length)) in self.faces().zip(&self.vectors) {
+            let lows = face.iter().filter(|i| heights[**i as usize] <= 0.0).count();
+            if lows == face.len() {
+                (below, open) = (below + length, open + all);
+                continue;
+            }
+            if lows == 0 {
+                above += length;
+                continue;
+            }
+            // About a corner of the face, so that nothing cancels.
+            let base = self.corners[face[0] as usize];
+            let (mut first, mut last, mut low) = (None::<DVec3>, DVec3::ZERO, DVec3::ZERO);
             let mut emit = |p: DVec3| match first {
-                None => (first, last) = (Some(p), DVec3::ZERO),
+                None => first = Some(p),
                 Some(first) => {
                     low += last.cross(p - first);
                     last = p - first;
                 }
             };
-            let base = self.corners[face[0] as usize] - about;
-            let mut before = DVec3::ZERO;
             let mut i = face[face.len() - 1] as usize;
             for &j in face {
                 let j = j as usize;
-                let (p, q) = (self.corners[i] - about, self.corners[j] - about);
                 let (hp, hq) = (heights[i], heights[j]);
+                let q = self.corners[j] - base;
                 if (hp <= 0.0) != (hq <= 0.0) {
+                    let p = self.corners[i] - base;
                     emit(p + (q - p) * (hp / (hp - hq)));
                 }
                 if hq <= 0.0 {
                     emit(q);
                 }
-                all += before.cross(q - base);
-                before = q - base;
                 i = j;
             }
-            let part = low.length();
-            below += part;
+            below += low.length();
             above += (all - low).length();
             open += low;
         }
@@ -186,7 +197,7 @@ impl Cell {
             }
             *i = *name;
         }
-        let mut cell = Cell { corners, around, ends, area: 0.0 };
+        let mut cell = Cell { corners, around, ends, vectors: Vec::new(), area: 0.0 };
         cell.measure();
         cell
     }

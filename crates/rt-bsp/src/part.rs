@@ -1,6 +1,7 @@
 //! [`Parts`]: what of the primitives lies in a cell.
 
 use crate::plane::{Plane, Scale, Side};
+use arrayvec::ArrayVec;
 use rt_bounds::Aabb;
 use rt_geom::glam::{DVec3, Vec3A};
 
@@ -191,7 +192,7 @@ impl<'a> Crowd<'a> {
         here
     }
 
-    /// How many parts lie where, exactly.
+    /// How many parts lie where: as each is told apart by itself, but for parts that a grain decides.
     pub(crate) fn tally(&self, plane: &Plane, touch: f64) -> Tally {
         let mut tally = Tally::default();
         if self.knots.is_empty() {
@@ -200,7 +201,9 @@ impl<'a> Crowd<'a> {
             }
             return tally;
         }
-        let mut stack = vec![0usize];
+        // Halves of halves: a way is never longer than the digits of the count.
+        let mut stack = ArrayVec::<usize, 64>::new();
+        stack.push(0);
         while let Some(at) = stack.pop() {
             let knot = self.knots[at];
             let side = plane.side_of_box(&knot.bound, touch);
@@ -217,10 +220,45 @@ impl<'a> Crowd<'a> {
                     tally.add(self.parts.side(&self.parts.list[i as usize], plane, touch), 1);
                 }
             } else {
-                stack.push(knot.second as usize);
-                stack.push(at + 1);
+                let _ = stack.try_push(knot.second as usize);
+                let _ = stack.try_push(at + 1);
             }
         }
         tally
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_crowd_is_counted_as_its_members_are() {
+        let mut parts = Parts::default();
+        let mut seed = 1u64;
+        let mut noise = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 40) as f64 / (1u64 << 23) as f64 - 1.0
+        };
+        for slot in 0..500 {
+            let middle = DVec3::new(noise(), noise(), noise());
+            let corners = [0; 3].map(|_| middle + DVec3::new(noise(), noise(), noise()) * 0.05);
+            let bound = Aabb::from_points(corners.map(|p| p.as_vec3a()));
+            // Every fifth is known by its box only.
+            parts.push(slot, bound, if slot % 5 == 0 { &[] } else { &corners });
+        }
+        let scale = Scale::of(&Aabb::new(Vec3A::splat(-1.1), Vec3A::splat(1.1))).unwrap();
+        let crowd = Crowd::new(&parts);
+        assert!(crowd.knots.len() > 50);
+        for part in parts.list.iter().filter(|part| part.count > 0) {
+            let [a, b, c] = *parts.corners(part) else { panic!("no triangle") };
+            let plane = Plane::through(&[a, b, c], (b - a).cross(c - a), scale).unwrap();
+            let mut tally = Tally::default();
+            for other in &parts.list {
+                tally.add(parts.side(other, &plane, plane.touch(scale)), 1);
+            }
+            assert!(tally.planar >= 1);
+            assert_eq!(crowd.tally(&plane, plane.touch(scale)), tally);
+        }
     }
 }
