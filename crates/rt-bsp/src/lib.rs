@@ -2,7 +2,7 @@
 //!
 //! A [`Bsp`] splits the box of a scene like a kd-tree, and besides by the planes in which the scene's own triangles lie and by
 //! planes through their edges. The surface area heuristic chooses among them, with the surfaces of the convex polytopes that
-//! cells then are. So a cell can fit what it holds however that is turned: rays test about one triangle each, and long diagonal
+//! cells then are. So a cell can fit what it holds however that is turned: rays test few triangles (on closed meshes about one each), and long diagonal
 //! triangles, which stand in a great many cells of a kd-tree, stand in few. The price is the build, which looks at far more planes.
 //!
 //! Planes are asked of the primitives by [`Bounded::outline`](rt_accel::Bounded::outline). Primitives without one are split by their

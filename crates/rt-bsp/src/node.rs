@@ -193,7 +193,7 @@ impl Bsp {
         &self.prims
     }
 
-    /// What the tree is made of. `O(n)`, but some microseconds a node: every cell is cut again.
+    /// What the tree is made of. `O(n)`, but every cell is cut again.
     pub fn statistics(&self) -> Statistics {
         let mut s = Statistics::default();
         let root = Cell::of_box(&self.bound);

@@ -138,7 +138,7 @@ impl Tally {
 
 /// The parts of a large cell in a tree of boxes, so that those on either side of a plane are counted without looking at each.
 ///
-/// Source: Ize, Wald and Parker, "Ray tracing with the BSP tree", RT 2008, section 4.2.
+/// Source: Ize, Wald and Parker, "Ray tracing with the BSP tree", RT 2008.
 #[derive(Debug)]
 pub(crate) struct Crowd<'a> {
     parts: &'a Parts,

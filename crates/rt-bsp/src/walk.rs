@@ -161,7 +161,7 @@ impl Bsp {
     /// several times. One that lies in a plane of the tree stands on one side of it only, and may be named before or after what else
     /// touches that plane. An eye that is not finite sees nothing. `Break` ends it.
     ///
-    /// Cost: that of the nodes that `keep` accepts; some 20 ns each, besides `keep`.
+    /// Cost: `O(1)` for each node that `keep` accepts, besides `keep`.
     ///
     /// Source: Fuchs, Kedem and Naylor, "On visible surface generation by a priori tree structures", SIGGRAPH 1980.
     pub fn ordered(
