@@ -1,6 +1,7 @@
 //! The structures, by name: the one place where names become types. Variants follow a colon.
 
 use rt_accel::{Clip, Exhaustive, Structure};
+use rt_bsp::{Bsp, BspParams};
 use rt_bvh::{Bvh, BvhParams};
 use rt_grid::{Grid, GridParams};
 use rt_kdtree::{KdTree, KdTreeParams};
@@ -32,6 +33,8 @@ structures! {
     "bvh" => Bvh: BvhParams::default(),
     "kdtree" => KdTree: KdTreeParams::default(),
     "kdtree:box" => KdTree: KdTreeParams { clip: Clip::Box, ..KdTreeParams::default() },
+    "bsp" => Bsp: BspParams::default(),
+    "bsp:axis" => Bsp: BspParams::axis_only(),
     "grid" => Grid: GridParams::default(),
     "grid:nested" => Grid: GridParams::nested(),
     "grid:two-level" => Grid: GridParams::two_level(),

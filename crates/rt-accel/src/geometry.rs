@@ -31,6 +31,12 @@ pub trait Bounded: Send + Sync {
     fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
         self.bound_from(prim, origin).overlap(*cell)
     }
+
+    /// The corners of a triangle that holds all of `prim`, relative to `origin`, each coordinate rounded once; `None`, as the
+    /// default says, where a box must do. For builders that split space by the primitives' own planes.
+    fn outline(&self, _prim: u32, _origin: DVec3) -> Option<[DVec3; 3]> {
+        None
+    }
 }
 
 /// What of a primitive counts in a cell: a knob of structures that divide space.
@@ -157,6 +163,9 @@ impl<P: crate::WorldBound> Bounded for Vec<P> {
     fn clipped_bound(&self, prim: u32, cell: &Aabb, origin: DVec3) -> Aabb {
         self.get(prim as usize).map_or(Aabb::EMPTY, |member| member.clipped_bound(cell, origin))
     }
+    fn outline(&self, prim: u32, origin: DVec3) -> Option<[DVec3; 3]> {
+        self.get(prim as usize)?.outline(origin)
+    }
 }
 
 impl<R: Real, P: Primitive<R>> Geometry<R> for Vec<P> {
@@ -212,6 +221,9 @@ macro_rules! forward {
             }
             fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
                 (**self).bound_under(prim, map)
+            }
+            fn outline(&self, prim: u32, origin: DVec3) -> Option<[DVec3; 3]> {
+                (**self).outline(prim, origin)
             }
         }
 

@@ -80,6 +80,9 @@ impl<P: WorldBound, V: Send + Sync> WorldBound for Guarded<P, V> {
     fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
         self.inner.clipped_bound(cell, origin)
     }
+    fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+        self.inner.outline(origin)
+    }
 }
 
 impl<R: Real, P: Primitive<R>, V: BoundingVolume + Send + Sync> Primitive<R> for Guarded<P, V> {

@@ -36,6 +36,11 @@ pub trait WorldBound: Send + Sync {
     fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
         self.world_bound_from(origin).overlap(*cell)
     }
+    /// The corners of a triangle that holds all of it, relative to `origin`, each coordinate rounded once; `None`, as the
+    /// default says, where a box must do. Structures that split space by the primitives' own planes ask for it.
+    fn outline(&self, _origin: DVec3) -> Option<[DVec3; 3]> {
+        None
+    }
 }
 
 /// Something a ray can hit, from any thread, in world space, by rays of precision `R`.
@@ -126,6 +131,9 @@ macro_rules! forward {
             }
             fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
                 (**self).clipped_bound(cell, origin)
+            }
+            fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+                (**self).outline(origin)
             }
         }
 

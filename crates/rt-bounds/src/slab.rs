@@ -207,6 +207,13 @@ impl SlabRay {
         self.far
     }
 
+    /// What distances are: `(t - start) * unit`, as `[start, unit]`, `unit` a power of two that brings the largest component of
+    /// the direction into `[1, 2)` (as far as its exponent lies within `-1000..=1000`). For structures that meet planes of their own.
+    #[inline(always)]
+    pub fn measure(&self) -> [f64; 2] {
+        [self.start, self.unit]
+    }
+
     /// The ray along an axis.
     #[inline(always)]
     pub(crate) fn side(&self, a: usize) -> SlabSide {

@@ -82,6 +82,9 @@ impl WorldBound for Facet {
     fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
         self.mesh.clipped_bound(self.number, cell, origin)
     }
+    fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+        self.mesh.outline(self.number, origin)
+    }
 }
 
 impl<R: Real> Primitive<R> for Facet {

@@ -92,6 +92,9 @@ impl WorldBound for Solid {
     fn clipped_bound(&self, cell: &Aabb, origin: DVec3) -> Aabb {
         each!(self, shape => shape.clipped_bound(cell, origin))
     }
+    fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+        each!(self, shape => shape.outline(origin))
+    }
 }
 
 impl<R: Real> Primitive<R> for Solid {

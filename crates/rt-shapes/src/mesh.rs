@@ -224,6 +224,10 @@ impl<V: Real> Bounded for TriangleMesh<V> {
     fn bound_under(&self, prim: u32, map: &Transform) -> DAabb {
         DAabb::around_carried(self.get(prim).map_or([DVec3::NAN; 3], |triangle| triangle.corners), map)
     }
+
+    fn outline(&self, prim: u32, origin: DVec3) -> Option<[DVec3; 3]> {
+        self.get(prim).map(|triangle| triangle.corners.map(|corner| corner - origin))
+    }
 }
 
 impl<R: Real, V: Real + Into<R>> Geometry<R> for TriangleMesh<V> {

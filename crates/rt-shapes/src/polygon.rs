@@ -151,6 +151,10 @@ impl WorldBound for Polygon {
         let parts = self.triangles.iter().map(|t| t.clipped_bound(cell, origin));
         parts.fold(Aabb::EMPTY, Aabb::union)
     }
+    fn outline(&self, origin: DVec3) -> Option<[DVec3; 3]> {
+        let [only] = *self.triangles else { return None };
+        Some(only.corners.map(|corner| corner - origin))
+    }
 }
 
 impl<R: Real> Primitive<R> for Polygon {
