@@ -1,0 +1,89 @@
+//! The tree answers as every primitive in turn does, bit for bit: closest, any, all, many; in both precisions.
+
+use rt_accel::{Clip, Mailing, Sah};
+use rt_geom::Real;
+use rt_geom::glam::DVec3;
+use rt_measure::conform;
+use rt_measure::rays::troublesome;
+use rt_octree::{Octree, OctreeParams, Split, Stop};
+use rt_scenes::{SceneGeometry, Solid, Trial};
+
+/// The default; the textbooks'; Morton codes; and as deep as the parameters can make it.
+fn params() -> [OctreeParams; 4] {
+    let classic = OctreeParams { clip: Clip::Box, mailing: Mailing::Inverse, ..OctreeParams::classic(4, 6) };
+    let linear = OctreeParams { mailing: Mailing::Hashed, stop: Stop::Count, ..OctreeParams::linear() };
+    let deep = OctreeParams {
+        split: Split::Cost,
+        stop: Stop::Cost { ahead: 3 },
+        sah: Sah { traverse: 0.0, intersect: 1.0 },
+        max_depth: Some(21),
+        most_references: 20.0,
+        ..OctreeParams::default()
+    };
+    [OctreeParams::default(), classic, OctreeParams { max_depth: Some(7), ..linear }, deep]
+}
+
+/// Where hundreds of primitives coincide the truth alone, by exact arithmetic, takes seconds: fewer rays.
+const SLOW: [&str; 8] = [
+    "300 times one triangle",
+    "150 pairs, back to back",
+    "300 equal centroids",
+    "coordinates 2^i, i from -126 to 126",
+    "coordinates 3^-i about a corner",
+    "boxes nested from 2^-60 to 2^60",
+    "huge triangle over a small soup",
+    "one point, 300 times",
+];
+
+fn check<V: Real + Into<R>, R: Real>(trial: &Trial<V>, params: &[OctreeParams]) {
+    let points = trial.points();
+    let few = params.len() < 4 && SLOW.contains(&trial.name.as_str());
+    let rays = troublesome::<R>(&trial.mesh, if few { &points[..4] } else { &points });
+    conform::conform_all::<Octree, R, _>(&trial.name, &trial.mesh, params, &rays)
+        .unwrap_or_else(|why| panic!("{why}"));
+}
+
+#[test]
+fn on_every_trial_in_f32() {
+    for (i, trial) in rt_scenes::trials().iter().enumerate() {
+        check::<f32, f32>(trial, &[params()[0], params()[1 + i % 3]]);
+    }
+}
+
+#[test]
+fn on_every_trial_in_f64() {
+    for (i, trial) in rt_scenes::trials().iter().enumerate().step_by(4) {
+        check::<f32, f64>(trial, &[params()[0], params()[1 + i / 4 % 3]]);
+    }
+    for trial in rt_scenes::fine_trials() {
+        check::<f64, f64>(&trial, &params());
+    }
+}
+
+#[test]
+#[ignore = "minutes"]
+fn on_every_trial_with_all_parameters() {
+    for trial in rt_scenes::trials() {
+        check::<f32, f32>(&trial, &params());
+        check::<f32, f64>(&trial, &params());
+    }
+}
+
+#[test]
+fn on_spheres_and_polygons() {
+    let scene = rt_scenes::by_name("balls", Some(2)).unwrap();
+    let SceneGeometry::Solids(solids) = scene.geometry else { panic!("balls are solids") };
+    let points: Vec<DVec3> = solids
+        .iter()
+        .filter_map(|solid| match solid {
+            Solid::Sphere(ball) => Some(ball.center() + DVec3::X * ball.radius()),
+            _ => None,
+        })
+        .collect();
+    let rays = troublesome::<f32>(&solids, &points);
+    conform::conform_all::<Octree, f32, _>("balls 2", &solids, &params(), &rays)
+        .unwrap_or_else(|why| panic!("{why}"));
+    let rays = troublesome::<f64>(&solids, &points);
+    conform::conform_all::<Octree, f64, _>("balls 2", &solids, &params(), &rays)
+        .unwrap_or_else(|why| panic!("{why}"));
+}
