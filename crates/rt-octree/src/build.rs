@@ -261,6 +261,8 @@ impl Splitter<'_> {
         }
         let ahead = match self.params.stop {
             Stop::Count => u32::MAX,
+            // What does not pay is not undone in the top.
+            Stop::Cost { .. } if count > ALONE => 0,
             Stop::Cost { ahead } => ahead,
         };
         let centre = middle(&task.cell, self.core);
@@ -300,21 +302,47 @@ impl Splitter<'_> {
         Some(Halved { planes, children })
     }
 
-    /// The planes that the surface area heuristic chooses, one axis at a time.
+    /// The planes that the surface area heuristic chooses: first the best along any axis, then the best along another with that one in place, then
+    /// along the third; then the first two once more, with the others in place.
     fn cheapest(&self, task: &Task) -> [f32; 3] {
         let core = finite(task.parts.iter().map(|(_, part)| part));
-        let empty = Bins::new(&core);
-        let counted = |parts: &[Part]| {
-            let mut bins = empty.clone();
-            parts.iter().for_each(|(_, part)| bins.count(part));
-            bins
-        };
-        if task.parts.len() <= ALONE {
-            return counted(&task.parts).planes(&task.cell, task.parts.len(), self.params);
+        let mut planes = task.cell.max.to_array();
+        let mut left = [0, 1, 2].map(Some);
+        let mut order = [0; 3];
+        for i in 0..3 {
+            let mut best = None::<(usize, f32, f64)>;
+            for a in left.into_iter().flatten() {
+                let (plane, cost) = self.best_along(task, a, &core, planes);
+                if best.is_none_or(|best| cost < best.2) {
+                    best = Some((a, plane, cost));
+                }
+            }
+            let Some((a, plane, _)) = best else { break };
+            (planes[a], order[i], left[a]) = (plane, a, None);
         }
-        let mut all = empty.clone();
-        grow(task.parts.chunks(ALONE).collect(), counted).iter().for_each(|bins| all.add(bins));
-        all.planes(&task.cell, task.parts.len(), self.params)
+        for i in 0..2 {
+            // Where nothing else was placed since, nothing has changed.
+            if order[i + 1..].iter().any(|a| planes[*a] != task.cell.max[*a]) {
+                planes[order[i]] = self.best_along(task, order[i], &core, planes).0;
+            }
+        }
+        planes
+    }
+
+    fn best_along(&self, task: &Task, axis: usize, core: &Aabb, planes: [f32; 3]) -> (f32, f64) {
+        let mut bins = Bins::new(axis, task.parts.len(), core, planes);
+        if task.parts.len() <= ALONE {
+            bins.count(&task.parts);
+        } else {
+            let empty = bins.clone();
+            let counted = |parts: &[Part]| {
+                let mut bins = empty.clone();
+                bins.count(parts);
+                bins
+            };
+            grow(task.parts.chunks(ALONE).collect(), counted).iter().for_each(|some| bins.add(some));
+        }
+        bins.cheapest(&task.cell, self.params)
     }
 
     /// Deals the parts of a cell out to its children, unless there come too many of it.

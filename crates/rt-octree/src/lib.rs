@@ -46,8 +46,8 @@
 //!
 //! With the children numbered by how many planes the ray crosses to get into them (bit 0 of the number for x, 1 for y, 2 for z, mirrored where
 //! the ray descends), those it meets form a chain: each has the bits of the one before, and another. So their order is that of
-//! their numbers, without sorting; where planes are crossed at the same time up to rounding, more than one such chain may be visited. This
-//! is the order of Revelles, Ureña and Lastra, "An efficient parametric algorithm for octree traversal", WSCG 2000, who go from child to
+//! their numbers, without sorting; where planes are crossed at the same time up to rounding, more than one such chain may be visited, and a
+//! ray within a plane passes by one side of it after the other. This is the order of Revelles, Ureña and Lastra, "An efficient parametric algorithm for octree traversal", WSCG 2000, who go from child to
 //! child; here eight intervals are made at once, in lanes, because then nothing is lost to rounding and there are few branches.
 //!
 //! # Invariants

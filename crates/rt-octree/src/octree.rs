@@ -149,9 +149,8 @@ impl Octree {
             Place::Link(link) if link & LEAF != 0 => View::Leaf(link & !LEAF),
             Place::Link(link) => {
                 let Some(node) = self.nodes.get(link as usize) else { return View::Leaf(!LEAF) };
-                let children = core::array::from_fn(|c| {
-                    (node.full >> c & 1 == 1).then(|| Place::Link(node.links[c]))
-                });
+                let children =
+                    core::array::from_fn(|c| (node.full >> c & 1 == 1).then(|| Place::Link(node.links[c])));
                 View::Split { planes: node.planes, children }
             }
             Place::Run(run) => {
@@ -226,7 +225,9 @@ impl Octree {
         {
             return fail("leaves do not take the references one after another".to_string());
         }
-        if self.storage == Storage::Linear && (self.keys.len() != leaves || !self.keys.is_sorted_by(|a, b| a < b)) {
+        if self.storage == Storage::Linear
+            && (self.keys.len() != leaves || !self.keys.is_sorted_by(|a, b| a < b))
+        {
             return fail(format!("{} keys of {leaves} leaves do not ascend", self.keys.len()));
         }
         let mut times = vec![0u32; source.prim_count()];

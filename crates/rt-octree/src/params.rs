@@ -83,7 +83,7 @@ impl Default for OctreeParams {
             max_depth: None,
             max_prims: 1,
             most_references: 16.0,
-            sah: Sah { traverse: 1.0, intersect: 1.0 },
+            sah: Sah { traverse: 2.0, intersect: 1.0 },
             clip: Clip::Exact,
             mailing: Mailing::None,
             storage: Storage::Nodes,

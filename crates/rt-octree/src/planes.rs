@@ -63,109 +63,165 @@ pub(crate) fn share(part: &Aabb, cell: &Aabb) -> f64 {
     if length(cell) > 0.0 { length(part) / length(cell) } else { 1.0 }
 }
 
-/// How finely positions are looked at along an axis.
+/// How finely positions are looked at along an axis, at most.
 const BINS: usize = 32;
 
-/// What begins and ends in one thirty-second of the extent of some parts along an axis.
+/// What begins and ends in one thirty-second of the extent of some parts along an axis, in each of the four regions into which planes across the
+/// other axes part the cell.
 #[derive(Clone, Copy, Debug)]
 struct Bin {
-    begin: u32,
-    end: u32,
+    begin: [u32; 4],
+    end: [u32; 4],
     /// The least and the greatest end of a part here.
     least: f32,
     greatest: f32,
 }
 
 impl Bin {
-    const EMPTY: Bin = Bin { begin: 0, end: 0, least: f32::INFINITY, greatest: f32::NEG_INFINITY };
-
-    fn see(&mut self, position: f32) {
-        self.least = self.least.min(position);
-        self.greatest = self.greatest.max(position);
-    }
+    const EMPTY: Bin = Bin { begin: [0; 4], end: [0; 4], least: f32::INFINITY, greatest: f32::NEG_INFINITY };
 }
 
-/// The ends of some parts along three axes, counted.
+/// The ends of some parts along one axis, counted.
 #[derive(Clone, Debug)]
 pub(crate) struct Bins {
-    low: Vec3A,
-    scale: Vec3A,
-    bins: [[Bin; BINS]; 3],
+    axis: usize,
+    /// The other axes, and the planes across them.
+    others: [(usize, f32); 2],
+    low: f32,
+    scale: f32,
+    last: usize,
+    count: [u32; 4],
+    bins: [Bin; BINS],
 }
 
 impl Bins {
-    /// No parts yet, of a cell in which finite coordinates lie in `core`.
-    pub(crate) fn new(core: &Aabb) -> Bins {
-        let size = core.max - core.min;
-        let usable = size.cmpgt(Vec3A::ZERO) & size.cmple(Vec3A::splat(f32::MAX));
-        let scale = Vec3A::select(usable, BINS as f32 / size, Vec3A::ZERO);
+    /// Nothing counted yet of about `parts` parts, along an axis of a cell in which they have their finite coordinates in `core`, with planes
+    /// across the other axes.
+    pub(crate) fn new(axis: usize, parts: usize, core: &Aabb, planes: [f32; 3]) -> Bins {
+        let size = core.max[axis] - core.min[axis];
+        // A few for each of a few parts.
+        let bins = (2 * parts).clamp(4, BINS);
         // Of the smallest sizes there is no reciprocal.
-        let scale = scale.min(Vec3A::splat(f32::MAX));
-        Bins { low: core.min, scale, bins: [[Bin::EMPTY; BINS]; 3] }
+        let scale = if size > 0.0 { (bins as f32 / size).min(f32::MAX) } else { 0.0 };
+        let others = [(axis + 1) % 3, (axis + 2) % 3].map(|a| (a, planes[a]));
+        Bins {
+            axis,
+            others,
+            low: core.min[axis],
+            scale,
+            last: bins - 1,
+            count: [0; 4],
+            bins: [Bin::EMPTY; BINS],
+        }
     }
 
-    /// Counts a part.
-    #[inline]
-    pub(crate) fn count(&mut self, part: &Aabb) {
+    /// Counts some parts.
+    pub(crate) fn count(&mut self, parts: &[Part]) {
+        let [(b, at_b), (c, at_c)] = self.others;
         // Casts saturate, and NaN is 0. Monotone, so bins are in the order of the positions in them.
-        let at = |p: Vec3A| ((p - self.low) * self.scale).to_array().map(|x| (x as usize).min(BINS - 1));
-        let (begin, end) = (at(part.min), at(part.max));
-        for a in 0..3 {
-            let bins = &mut self.bins[a];
-            bins[begin[a]].begin += 1;
-            bins[begin[a]].see(part.min[a]);
-            bins[end[a]].end += 1;
-            bins[end[a]].see(part.max[a]);
+        let (low, scale, last) = (self.low, self.scale, self.last.min(BINS - 1));
+        let bin = |x: f32| (((x - low) * scale) as usize).min(last);
+        for (_, part) in parts {
+            let (from, to) = (part.min[self.axis], part.max[self.axis]);
+            let (first, last) = (bin(from), bin(to));
+            let sides = |a: usize, at: f32| {
+                let above = part.max[a] > at;
+                (!above || part.min[a] < at, above)
+            };
+            let ((b_under, b_over), (c_under, c_over)) = (sides(b, at_b), sides(c, at_c));
+            let regions =
+                [b_under && c_under, b_over && c_under, b_under && c_over, b_over && c_over].map(u32::from);
+            for (q, here) in regions.into_iter().enumerate() {
+                self.bins[first].begin[q] += here;
+                self.bins[last].end[q] += here;
+                self.count[q] += here;
+            }
+            self.bins[first].least = self.bins[first].least.min(from);
+            self.bins[first].greatest = self.bins[first].greatest.max(from);
+            self.bins[last].least = self.bins[last].least.min(to);
+            self.bins[last].greatest = self.bins[last].greatest.max(to);
         }
     }
 
     /// Counts what another one has counted too.
     pub(crate) fn add(&mut self, other: &Bins) {
-        for (mine, theirs) in self.bins.iter_mut().flatten().zip(other.bins.iter().flatten()) {
-            mine.begin += theirs.begin;
-            mine.end += theirs.end;
-            mine.see(theirs.least);
-            mine.see(theirs.greatest);
+        for (mine, theirs) in self.bins.iter_mut().zip(&other.bins) {
+            for q in 0..4 {
+                mine.begin[q] += theirs.begin[q];
+                mine.end[q] += theirs.end[q];
+            }
+            mine.least = mine.least.min(theirs.least);
+            mine.greatest = mine.greatest.max(theirs.greatest);
+        }
+        for (mine, theirs) in self.count.iter_mut().zip(other.count) {
+            *mine += theirs;
         }
     }
 
-    /// The plane along each axis at which passing `count` parts costs least, with that cost; the upper face where none pays.
-    pub(crate) fn planes(&self, cell: &Aabb, count: usize, params: &OctreeParams) -> [f32; 3] {
+    /// The plane along the axis at which passing what was counted costs least, and that cost; the upper face where none pays.
+    pub(crate) fn cheapest(&self, cell: &Aabb, params: &OctreeParams) -> (f32, f64) {
         let (visit, test) = (params.sah.traverse as f64, params.sah.intersect as f64);
-        let mut planes = cell.max.to_array();
-        for a in 0..3 {
-            let (low, high) = (cell.min[a], cell.max[a]);
-            let mut best = visit + test * count as f64;
-            let mut consider = |position: f32, below: u32, above: u32| {
-                if !(low < position && position < high && position.is_finite()) {
-                    return;
+        let (low, high) = (cell.min[self.axis], cell.max[self.axis]);
+        let shares = self.shares(cell);
+        let price = |counts: [u32; 4], length: f64| {
+            let mut price = 0.0;
+            for (n, [flat, per_length]) in counts.into_iter().zip(shares) {
+                let share = flat + per_length * length;
+                price += if n == 0 { 0.0 } else { share * (visit + test * n as f64) };
+            }
+            price
+        };
+        let length = |from: f32, to: f32| (to - from).min(f32::MAX) as f64;
+        let mut best = (high, price(self.count, length(low, high)));
+        let mut consider = |position: f32, below: [u32; 4], above: [u32; 4]| {
+            if low < position && position < high && position.is_finite() {
+                let cost = price(below, length(low, position)) + price(above, length(position, high));
+                if cost < best.1 {
+                    best = (position, cost);
                 }
-                let (mut under, mut over) = (*cell, *cell);
-                under.max[a] = position;
-                over.min[a] = position;
-                let cost = |n: u32, part: &Aabb| {
-                    if n == 0 { 0.0 } else { share(part, cell) * (visit + test * n as f64) }
-                };
-                let cost = cost(below, &under) + cost(above, &over);
-                if cost < best {
-                    (best, planes[a]) = (cost, position);
-                }
-            };
-            // Between bins: what begins before may reach below, what ends after above.
-            let (mut below, mut above) = (0, count as u32);
-            let mut before = f32::NEG_INFINITY;
-            for bin in &self.bins[a] {
-                if bin.begin + bin.end == 0 {
-                    continue;
-                }
-                consider(before, below, above);
-                consider(bin.least, below, above);
-                below += bin.begin;
-                above -= bin.end;
-                before = bin.greatest;
+            }
+        };
+        // Between bins: what begins before may reach below, what ends after above.
+        let (mut below, mut above) = ([0; 4], self.count);
+        let mut before = f32::NEG_INFINITY;
+        for bin in &self.bins[..=self.last.min(BINS - 1)] {
+            if bin.least > bin.greatest {
+                continue;
             }
             consider(before, below, above);
+            consider(bin.least, below, above);
+            for q in 0..4 {
+                below[q] += bin.begin[q];
+                above[q] -= bin.end[q];
+            }
+            before = bin.greatest;
         }
-        planes
+        consider(before, below, above);
+        best
+    }
+
+    /// The share of the lines through a cell that meet part of a region, as `[a, b]` of `a + b * length` along the axis.
+    fn shares(&self, cell: &Aabb) -> [[f64; 2]; 4] {
+        let side = |from: f32, to: f32| (to - from).clamp(0.0, f32::MAX) as f64;
+        let [(b, at_b), (c, at_c)] = self.others;
+        let whole = [
+            side(cell.min[self.axis], cell.max[self.axis]),
+            side(cell.min[b], cell.max[b]),
+            side(cell.min[c], cell.max[c]),
+        ];
+        let [x, y, z] = whole;
+        let (area, length) = (x * y + y * z + z * x, x + y + z);
+        let ys = [side(cell.min[b], at_b), side(at_b, cell.max[b])];
+        let zs = [side(cell.min[c], at_c), side(at_c, cell.max[c])];
+        [0, 1, 2, 3].map(|q| {
+            let (y, z) = (ys[q & 1], zs[q >> 1]);
+            if area > 0.0 {
+                [y * z / area, (y + z) / area]
+            } else if length > 0.0 {
+                [(y + z) / length, 1.0 / length]
+            } else {
+                [1.0, 0.0]
+            }
+        })
     }
 }

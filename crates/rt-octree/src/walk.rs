@@ -44,7 +44,8 @@ impl Spans {
         let [fy, ty] = slab.crossing(Axis::Y, planes[1]);
         let [fz, tz] = slab.crossing(Axis::Z, planes[2]);
         // Children 0 to 3: not, along x, along y, along both. Where a crossing is not a number its child is empty.
-        let from = Vec4::new(enter, fx, enter, fx).max(Vec4::new(enter, enter, fy, fy)).max(Vec4::splat(enter));
+        let from =
+            Vec4::new(enter, fx, enter, fx).max(Vec4::new(enter, enter, fy, fy)).max(Vec4::splat(enter));
         let to = Vec4::new(tx, leave, tx, leave).min(Vec4::new(ty, ty, leave, leave)).min(Vec4::splat(leave));
         let (from_z, to_z) = (Vec4::splat(fz).max(from), Vec4::splat(tz).min(to));
         let met = from.cmple(to_z).bitmask() | from_z.cmple(to).bitmask() << 4;

@@ -1,10 +1,11 @@
 //! The tree answers as every primitive in turn does, bit for bit: closest, any, all, many; in both precisions.
 
-use rt_accel::{Clip, Mailing, Sah};
-use rt_geom::Real;
-use rt_geom::glam::DVec3;
+use rt_accel::{Clip, Hit, Mailing, Primitive, Sah, WorldBound};
+use rt_bounds::Aabb;
+use rt_geom::glam::{DVec3, Vec3A};
+use rt_geom::{Ray, Real};
 use rt_measure::conform;
-use rt_measure::rays::troublesome;
+use rt_measure::rays::{self, troublesome};
 use rt_octree::{Octree, OctreeParams, Split, Stop};
 use rt_scenes::{SceneGeometry, Solid, Trial};
 
@@ -86,4 +87,35 @@ fn on_spheres_and_polygons() {
     let rays = troublesome::<f64>(&solids, &points);
     conform::conform_all::<Octree, f64, _>("balls 2", &solids, &params(), &rays)
         .unwrap_or_else(|why| panic!("{why}"));
+}
+
+/// A plane across one axis, without end.
+struct Plane(usize, f32);
+
+impl WorldBound for Plane {
+    fn world_bound(&self) -> Aabb {
+        let mut b = Aabb::INFINITE;
+        (b.min[self.0], b.max[self.0]) = (self.1, self.1);
+        b
+    }
+}
+
+impl Primitive for Plane {
+    type At = ();
+    fn intersect(&self, ray: &Ray) -> Option<Hit<()>> {
+        let t = (self.1 as f64 - ray.origin[self.0] as f64) / ray.dir[self.0] as f64;
+        if ray.dir[self.0] == 0.0 { None } else { ray.admit(t).map(|t| Hit { t, at: () }) }
+    }
+}
+
+#[test]
+fn on_planes_without_end() {
+    let planes: Vec<Plane> = (0..90).map(|i| Plane(i % 3, (i * i % 41) as f32)).collect();
+    let one: Vec<Plane> = vec![Plane(1, 5.0)];
+    let inside = Aabb::new(Vec3A::splat(-20.0), Vec3A::splat(60.0));
+    for planes in [planes, one] {
+        let rays = rays::uniform(1, &inside, 100);
+        conform::conform_all::<Octree, f32, _>("planes", &planes, &params(), &rays)
+            .unwrap_or_else(|why| panic!("{why}"));
+    }
 }
