@@ -5,6 +5,7 @@ use rt_bsp::{Bsp, BspParams};
 use rt_bvh::{Bvh, BvhParams};
 use rt_grid::{Grid, GridParams};
 use rt_kdtree::{KdTree, KdTreeParams};
+use rt_octree::{Octree, OctreeParams};
 
 /// Something to be done with a structure whose name was given.
 pub trait Job {
@@ -38,5 +39,8 @@ structures! {
     "grid" => Grid: GridParams::default(),
     "grid:nested" => Grid: GridParams::nested(),
     "grid:two-level" => Grid: GridParams::two_level(),
+    "octree" => Octree: OctreeParams::default(),
+    "octree:classic" => Octree: OctreeParams::classic(4, 8),
+    "octree:linear" => Octree: OctreeParams::linear(),
     "exhaustive" => Exhaustive: (),
 }
