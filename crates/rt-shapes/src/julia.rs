@@ -1,10 +1,11 @@
 //! [`Julia`]: quaternion Julia sets, met by sphere tracing with steps that are proved.
 
+use crate::near::Near;
 use crate::{Partials, Shape, Surface, Uv};
 use rt_accel::{BuildError, Counts, Hit, Primitive, WorldBound};
 use rt_bounds::Aabb;
 use rt_geom::glam::{DVec2, DVec3, DVec4, Vec4Swizzles};
-use rt_geom::{Ray, Real};
+use rt_geom::{Ray, Real, Vector};
 
 /// Unit roundoff of `f64`.
 const U: f64 = f64::EPSILON / 2.0;
@@ -27,6 +28,13 @@ const FAR: f64 = 1e8;
 /// once. Parts within the tolerance of a ray are met though the ray may pass them: the error is one-sided, and falls with the
 /// tolerance. Only the closest hit is reported by [`Primitive::all_hits`]: how often a line crosses such a set is not for finite
 /// arithmetic to say.
+///
+/// Rays that [`Surface::spawn`] sends off from a hit, to the side of its normal, begin outside of what is met: that is looked at
+/// when the surface is asked for, at the origins in the precision of the ray and in `f64`, and the way there from the arriving ray is
+/// proved to hold no point of the set. So they neither end where they begin nor come out behind a wall. What they meet later is
+/// as right as for any other ray; that may be soon, the set being rough at every scale. Towards the other side there is only the
+/// set, which is solid: such rays end at once. Moved by an [`Instance`](rt_accel::Instance) origins come to lie elsewhere in the same
+/// ball, unless it stretches more one way than another.
 ///
 /// ```
 /// use rt_accel::Primitive;
@@ -101,6 +109,18 @@ pub enum Traced {
     Met(f64),
     /// Up to this distance there is nothing; what comes then is not known.
     Unresolved(f64),
+}
+
+/// Where a ray came to an end.
+#[derive(Clone, Copy, Debug)]
+struct End {
+    near: Near,
+    /// The last place from which it stepped; none if it ended where it began.
+    before: Option<f64>,
+    /// Where it ended.
+    s: f64,
+    /// Whether it met the set, or ran out of steps.
+    met: bool,
 }
 
 /// The product of two quaternions, `x` the real part.
@@ -215,61 +235,87 @@ impl Julia {
 
     /// Follows a ray, and says what is known of it. The work is added to `counts`.
     pub fn trace(&self, ray: &Ray<f64>, counts: &mut JuliaCounts) -> Traced {
-        if !ray.is_valid() || self.params.w.abs() > self.escape {
-            return Traced::Missed;
+        match self.follow(ray, counts) {
+            // Moved and scaled, `t` may come out beside the interval by its rounding.
+            Some(end) if end.met => Traced::Met(end.near.t(end.s).clamp(ray.t_min, ray.t_max)),
+            Some(end) => Traced::Unresolved(end.near.t(end.s).clamp(ray.t_min, ray.t_max)),
+            None => Traced::Missed,
         }
-        let speed = ray.dir.length();
-        let (mut from, mut to) = (ray.t_min, ray.t_max);
+    }
+
+    /// Where a ray comes to an end; `None` if it misses.
+    fn follow(&self, ray: &Ray<f64>, counts: &mut JuliaCounts) -> Option<End> {
+        if !ray.is_valid() || self.params.w.abs() > self.escape {
+            return None;
+        }
+        let near = Near::new(ray, DVec3::ZERO, self.reach);
+        let Near { origin, dir, error, .. } = near;
+        let (mut from, mut to) = (near.before(ray.t_min), near.after(ray.t_max));
         for a in 0..3 {
-            let (o, d) = (ray.origin[a], ray.dir[a]);
+            let (o, d, reach) = (origin[a], dir[a], self.reach + error[a]);
             if d == 0.0 {
-                if o.abs() > self.reach {
-                    return Traced::Missed;
+                if o.abs() > reach {
+                    return None;
                 }
                 continue;
             }
             // Rounded outward, by less than the cube has to spare.
-            let (near, far) = ((-self.reach.copysign(d) - o) / d, (self.reach.copysign(d) - o) / d);
-            from = from.max(near - near.abs() * (4.0 * U));
-            to = to.min(far + far.abs() * (4.0 * U));
+            let (enter, leave) = ((-reach.copysign(d) - o) / d, (reach.copysign(d) - o) / d);
+            from = from.max(enter - enter.abs() * (4.0 * U));
+            to = to.min(leave + leave.abs() * (4.0 * U));
         }
-        if from > to {
-            return Traced::Missed;
+        if from > to || from == f64::INFINITY {
+            return None;
         }
-        if !(speed > 1e-150 && speed < 1e150 && from.is_finite()) {
-            // Squares leave the range: the same ray at another pace.
-            let pace = ray.dir.abs().max_element();
-            let unit = Ray { dir: ray.dir / pace, t_min: ray.t_min * pace, t_max: ray.t_max * pace, ..*ray };
-            if pace == 1.0 || !unit.is_valid() {
-                return Traced::Unresolved(from);
-            }
-            return match self.trace(&unit, counts) {
-                Traced::Missed => Traced::Missed,
-                Traced::Met(t) => Traced::Met(t / pace),
-                Traced::Unresolved(t) => Traced::Unresolved(t / pace),
-            };
-        }
-        let mut t = from;
+        let speed = dir.length();
+        let (mut s, mut before) = (from, None);
         for _ in 0..self.params.steps {
             counts.steps += 1;
-            let p = ray.at(t);
-            let (radius, most) = self.clear(p, counts);
+            let (radius, most) = self.clear(origin + dir * s, counts);
             if most <= self.params.tolerance {
-                return Traced::Met(t);
+                return Some(End { near, before, s, met: true });
             }
             // Rounding of the point, and of the step.
-            let radius = radius - 4.0 * U * (ray.origin.abs() + ray.dir.abs() * t.abs()).element_sum();
-            let next = t + radius / speed * (1.0 - 4.0 * U);
-            if next <= t {
+            let off = error.element_sum() + 4.0 * U * (origin.abs() + dir.abs() * s.abs()).element_sum();
+            let next = s + (radius - off) / speed * (1.0 - 4.0 * U);
+            if next <= s || next.is_nan() {
                 break;
             }
-            t = next;
-            if t > to {
-                return Traced::Missed;
+            (before, s) = (Some(s), next);
+            if s > to {
+                return None;
             }
         }
         counts.unresolved += 1;
-        Traced::Unresolved(t)
+        Some(End { near, before, s, met: false })
+    }
+
+    /// The radius of the proved ball around `p`, if rays that begin there get away: outside of what is met, and far enough for
+    /// rounding.
+    fn leaves(&self, p: DVec3) -> Option<f64> {
+        let (radius, most) = self.clear(p, &mut JuliaCounts::default());
+        (most > self.params.tolerance && radius > 16.0 * U * p.abs().element_sum()).then_some(radius)
+    }
+
+    /// The surface at `p`, outside of what is met by no more than `gap`, with an error that brings rays spawned on the side of its
+    /// normal to where they get away, on a way without a point of the set; `None` if none is found.
+    fn departure<R: Real>(&self, p: DVec3, gap: f64) -> Option<Surface> {
+        let radius = self.leaves(p)?;
+        let normal = self.uphill(p)?;
+        let least = gap + p.abs().max_element() * (4.0 * U);
+        // A quarter of the ball, so that an instance may turn the error's box; less in narrow places, more where the ray's own
+        // precision is coarse.
+        [0, -2, -4, -6, 1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28].into_iter().find_map(|k| {
+            let error = DVec3::splat((radius * 0.25 * f64::from(k).exp2()).max(least));
+            let surface = Surface { point: p, error, normal, shading: normal, uv: DVec2::ZERO };
+            let clear = |from: DVec3| {
+                let way = Ray::new(p, from - p).between(0.0, 1.0);
+                self.leaves(from).is_some()
+                    && self.follow(&way, &mut JuliaCounts::default()).is_none()
+            };
+            let spawned = surface.spawn(R::Vec3::nearest(normal)).origin.widen();
+            (clear(surface.spawn(normal).origin) && clear(spawned)).then_some(surface)
+        })
     }
 
     /// The direction in which the potential grows, in the space of the cut; `None` where the orbit does not escape.
@@ -326,21 +372,50 @@ impl<R: Real> Primitive<R> for Julia {
 }
 
 impl<R: Real> Shape<R> for Julia {
-    /// The normal is the gradient of the potential, by the Jacobian of the orbit. The error of the point is twice the tolerance, so that
-    /// spawned rays begin outside it; there are no parameters.
+    /// A point of the ray just outside of where it meets the set; the normal is the gradient of the potential there, by the
+    /// Jacobian of the orbit, and there are no parameters. The error covers the way from there to what is met, not that to the
+    /// set itself, which is another [`JuliaParams::tolerance`]; and it is chosen for [`Surface::spawn`], see [`Julia`].
+    ///
+    /// The ray is followed once more: about as much work as finding the hit. For a hit that `ray` does not have, or has from its
+    /// start: the point on the ray, and an error of twice the tolerance or more.
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
-        let (wide, t) = (ray.widen(), hit.t.into());
-        let point = wide.at(t);
-        let back = wide.dir.normalize_or(DVec3::Z);
+        let wide = ray.widen();
+        let end = self.follow(&wide, &mut JuliaCounts::default());
+        if let Some(End { near, before: Some(before), s, .. }) = end {
+            let at = |s: f64| near.origin + near.dir * s;
+            let speed = near.dir.length();
+            // Between the last step outside and the end; from the nearest to the end back.
+            let (mut out, mut inside) = (before, s);
+            for _ in 0..64 {
+                if (inside - out) * speed <= self.params.tolerance * 0.25 {
+                    break;
+                }
+                let middle = (out + inside) * 0.5;
+                *(if self.leaves(at(middle)).is_some() { &mut out } else { &mut inside }) = middle;
+            }
+            let places = if self.leaves(at(s)).is_some() { [s, out, before] } else { [out, before, before] };
+            let found = places
+                .into_iter()
+                .find_map(|place| self.departure::<R>(at(place), (s - place) * speed + near.error.max_element()));
+            if let Some(surface) = found {
+                return surface;
+            }
+        }
+        let point = end.map_or_else(|| wide.at(hit.t.into()), |end| end.near.origin + end.near.dir * end.s);
+        let back = -(wide.dir / wide.dir.abs().max_element()).normalize_or(DVec3::NEG_Z);
         // Where the orbit does not escape, a little before.
         let tried = [0.0, 1.0, 4.0, 16.0, 64.0];
-        let normal = tried.into_iter().find_map(|k| self.uphill(point - back * (k * self.params.tolerance)));
-        let normal = normal.unwrap_or(-back);
-        let rounding = (wide.origin.abs() + (wide.dir * t).abs()) * (4.0 * U);
-        let half =
-            point.abs().max_element() * if size_of::<R>() == 4 { f64::from(f32::EPSILON) } else { 0.0 };
-        let error = rounding + DVec3::splat(2.0 * self.params.tolerance + half);
-        Surface { point, error, normal, shading: normal, uv: DVec2::ZERO }
+        let normal = tried.into_iter().find_map(|k| self.uphill(point + back * (k * self.params.tolerance)));
+        let normal = normal.unwrap_or(back);
+        // Out of what is met, if that is not far.
+        let out = (0..8).map(|k| self.params.tolerance * f64::from(1u32 << k));
+        let out = out.into_iter().find_map(|off| self.departure::<R>(point + normal * off, off));
+        out.unwrap_or_else(|| {
+            let half =
+                point.abs().max_element() * if size_of::<R>() == 4 { f64::from(f32::EPSILON) } else { 0.0 };
+            let error = point.abs() * (8.0 * U) + DVec3::splat(2.0 * self.params.tolerance + half);
+            Surface { point, error, normal, shading: normal, uv: DVec2::ZERO }
+        })
     }
 
     /// Zero: the set has no parameters.
@@ -391,7 +466,10 @@ mod tests {
                         let hit = Hit { t, at: Uv::default() };
                         let surface = ball.surface(&ray, &hit);
                         assert!(surface.normal.dot(surface.point.normalize()) > 1.0 - 1e-9, "{surface:?}");
-                        assert!(ball.clearance(surface.spawn(surface.normal).origin) > 0.4 * tolerance);
+                        let spawned: DVec3 = surface.spawn(surface.normal).origin;
+                        assert!(ball.clearance(spawned) > 0.2 * tolerance);
+                        let away = (spawned.length() - 1.0) / tolerance;
+                        assert!((0.49..2.0).contains(&away), "{away} {tolerance:e} {surface:?}");
                     }
                     Traced::Missed => assert!(y > 1.0, "{y}"),
                     other => panic!("{other:?}"),
