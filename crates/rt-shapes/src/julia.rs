@@ -303,19 +303,22 @@ impl Julia {
         let radius = self.leaves(p)?;
         let normal = self.uphill(p)?;
         let least = gap + p.abs().max_element() * (4.0 * U);
-        // A quarter of the ball, so that an instance may turn the error's box; less in narrow places, more where the ray's own
-        // precision is coarse.
-        [0, -2, -4, -6, 1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28].into_iter().find_map(|k| {
-            let error = DVec3::splat((radius * 0.25 * f64::from(k).exp2()).max(least));
+        let clear = |from: DVec3| {
+            let way = Ray::new(p, from - p).between(0.0, 1.0);
+            self.leaves(from).is_some() && self.follow(&way, &mut JuliaCounts::default()).is_none()
+        };
+        // Errors of a quarter of the ball first; less in narrow places, more where the ray's own precision is coarse.
+        let sizes = [0, -2, -4, -6, 1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28];
+        let errors = sizes.map(|k| (radius * 0.25 * f64::from(k).exp2()).max(least));
+        let made = |error: f64| {
+            let error = DVec3::splat(error);
             let surface = Surface { point: p, error, normal, shading: normal, uv: DVec2::ZERO };
-            let clear = |from: DVec3| {
-                let way = Ray::new(p, from - p).between(0.0, 1.0);
-                self.leaves(from).is_some()
-                    && self.follow(&way, &mut JuliaCounts::default()).is_none()
-            };
             let spawned = surface.spawn(R::Vec3::nearest(normal)).origin.widen();
             (clear(surface.spawn(normal).origin) && clear(spawned)).then_some(surface)
-        })
+        };
+        // An instance that turns the box of the error makes the step as long as one side of it, or three.
+        let turned = |error: &f64| [1.0, 3.0].into_iter().all(|sides| clear(p + normal * (error * sides)));
+        errors.into_iter().filter(turned).find_map(made).or_else(|| errors.into_iter().find_map(made))
     }
 
     /// The direction in which the potential grows, in the space of the cut; `None` where the orbit does not escape.

@@ -4,7 +4,7 @@
 #![allow(clippy::print_stdout)]
 
 use core::ops::ControlFlow;
-use rt_accel::{Aggregate, Counts, Exhaustive, Hit, Primitive, WorldBound};
+use rt_accel::{Aggregate, BuildError, Counts, Exhaustive, Hit, Primitive, WorldBound};
 use rt_geom::glam::{DVec2, DVec3};
 use rt_geom::{Ray, Real, Vector};
 use rt_measure::error::HitError;
@@ -196,6 +196,19 @@ fn bad_parameters_are_named() {
     assert!(with(TerrainParams { tolerance: f64::NAN, ..fine }));
     assert!(Terrain::new(Fractal { hurst: 0.0, ..Fractal::default() }, fine).is_err());
     assert!(Terrain::new(Fractal { rise: f64::INFINITY, ..Fractal::default() }, fine).is_err());
+}
+
+#[test]
+fn what_takes_too_much_memory_is_refused_in_true_figures() {
+    let refused = hills(15, 6).refine().unwrap_err();
+    let side = (1 << 15) + 1;
+    assert_eq!(refused, BuildError::OutOfMemory { needed: side * side * 24 + (12 << 31), limit: 1 << 31 });
+    let params = TerrainParams { level: 15, cached: 15, ..TerrainParams::default() };
+    let refused = Terrain::new(Fractal::default(), params).unwrap_err();
+    assert_eq!(refused, BuildError::OutOfMemory { needed: ((1 << 30) - 1) / 3 * 32, limit: 1 << 31 });
+    let little = TerrainParams { memory_limit: 1 << 20, ..TerrainParams::default() };
+    let terrain = Terrain::new(Fractal::default(), little).unwrap();
+    assert!(terrain.bytes() < 1 << 16 && terrain.refine().is_err());
 }
 
 #[test]
