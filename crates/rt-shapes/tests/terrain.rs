@@ -262,7 +262,7 @@ fn rays_from_anywhere_at_any_pace_meet_what_the_mesh_says() {
             TerrainParams { min: min * scale, size: DVec2::splat(scale), level: 3, cached: 1, ..TerrainParams::default() };
         let terrain = Terrain::new(fractal, params).unwrap();
         let mesh: Mesh = Aggregate::build(terrain.refine().unwrap(), &()).unwrap();
-        let rays = from_afar(&terrain, scale, 600);
+        let rays = from_afar(&terrain, scale, 300);
         for ray in &rays {
             let wanted = mesh.intersect(ray);
             assert_eq!(terrain.intersect_counted(ray, &mut counts), wanted, "{ray:?}");
@@ -279,7 +279,7 @@ fn rays_from_anywhere_at_any_pace_meet_what_the_mesh_says() {
         }
     }
     println!("{hits} hits, {far} of them from far away, {counts:?}");
-    assert!(hits > 300 && far > 100, "{hits} {far}");
+    assert!(hits > 200 && far > 80, "{hits} {far}");
 }
 
 #[test]
@@ -294,14 +294,14 @@ fn rays_from_anywhere_are_right_by_exact_arithmetic() {
         .collect();
     // Distances below the normal range are rounded twice.
     let mut errors = [HitError::default(); 2];
-    for ray in from_afar(&terrain, 1.0, 1200) {
+    for ray in from_afar(&terrain, 1.0, 600) {
         let hit = terrain.intersect(&ray);
         let error = &mut errors[usize::from(hit.is_some_and(|hit| hit.t < f64::MIN_POSITIVE))];
         error.judge_triangles(&ray, &facets, hit.map(|hit| (hit.at.prim, hit.t)));
     }
     let [normal, tiny] = errors;
-    assert!(normal.rays > 1000 && normal.is_exact() && normal.t_ulp <= 0.5, "{normal:?}");
-    assert!(tiny.rays > 1 && tiny.is_exact() && tiny.t_ulp < 1.0, "{tiny:?}");
+    assert!(normal.rays > 500 && normal.is_exact() && normal.t_ulp <= 0.5, "{normal:?}");
+    assert!(tiny.rays > 0 && tiny.is_exact() && tiny.t_ulp < 1.0, "{tiny:?}");
 }
 
 #[test]
