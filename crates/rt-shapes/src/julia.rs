@@ -298,8 +298,9 @@ impl Julia {
     }
 
     /// The surface at `p`, outside of what is met by no more than `gap`, with an error that brings rays spawned on the side of its
-    /// normal to where they get away, on a way without a point of the set; `None` if none is found.
-    fn departure<R: Real>(&self, p: DVec3, gap: f64) -> Option<Surface> {
+    /// normal to where they get away, on a way without a point of the set, and does so at these multiples of the error, too; `None`
+    /// if none is found.
+    fn departure<R: Real>(&self, p: DVec3, gap: f64, multiples: &[f64]) -> Option<Surface> {
         let radius = self.leaves(p)?;
         let normal = self.uphill(p)?;
         let least = gap + p.abs().max_element() * (4.0 * U);
@@ -310,15 +311,13 @@ impl Julia {
         // Errors of a quarter of the ball first; less in narrow places, more where the ray's own precision is coarse.
         let sizes = [0, -2, -4, -6, 1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28];
         let errors = sizes.map(|k| (radius * 0.25 * f64::from(k).exp2()).max(least));
-        let made = |error: f64| {
-            let error = DVec3::splat(error);
+        errors.into_iter().find_map(|size| {
+            let error = DVec3::splat(size);
             let surface = Surface { point: p, error, normal, shading: normal, uv: DVec2::ZERO };
             let spawned = surface.spawn(R::Vec3::nearest(normal)).origin.widen();
-            (clear(surface.spawn(normal).origin) && clear(spawned)).then_some(surface)
-        };
-        // An instance that turns the box of the error makes the step as long as one side of it, or three.
-        let turned = |error: &f64| [1.0, 3.0].into_iter().all(|sides| clear(p + normal * (error * sides)));
-        errors.into_iter().filter(turned).find_map(made).or_else(|| errors.into_iter().find_map(made))
+            let all = multiples.iter().all(|k| clear(p + normal * (size * k)));
+            (all && clear(surface.spawn(normal).origin) && clear(spawned)).then_some(surface)
+        })
     }
 
     /// The direction in which the potential grows, in the space of the cut; `None` where the orbit does not escape.
@@ -387,19 +386,30 @@ impl<R: Real> Shape<R> for Julia {
         if let Some(End { near, before: Some(before), s, .. }) = end {
             let at = |s: f64| near.origin + near.dir * s;
             let speed = near.dir.length();
-            // Between the last step outside and the end; from the nearest to the end back.
+            // Between the last step outside and the end: nearer and nearer to where the ray came to be inside.
             let (mut out, mut inside) = (before, s);
-            for _ in 0..64 {
-                if (inside - out) * speed <= self.params.tolerance * 0.25 {
-                    break;
-                }
-                let middle = (out + inside) * 0.5;
-                *(if self.leaves(at(middle)).is_some() { &mut out } else { &mut inside }) = middle;
+            let mut places = Vec::new();
+            if self.leaves(at(s)).is_some() {
+                places.push(s);
             }
-            let places = if self.leaves(at(s)).is_some() { [s, out, before] } else { [out, before, before] };
-            let found = places
-                .into_iter()
-                .find_map(|place| self.departure::<R>(at(place), (s - place) * speed + near.error.max_element()));
+            for near in [0.25, 0.0625, 0.015_625] {
+                for _ in 0..64 {
+                    if (inside - out) * speed <= self.params.tolerance * near {
+                        break;
+                    }
+                    let middle = (out + inside) * 0.5;
+                    *(if self.leaves(at(middle)).is_some() { &mut out } else { &mut inside }) = middle;
+                }
+                places.push(out);
+            }
+            places.push(before);
+            // An instance that turns the box of the error makes the step as long as one side of it, or three.
+            let found = [&[1.0, 1.4, 1.8, 2.2, 2.6, 3.0][..], &[]].into_iter().find_map(|multiples| {
+                places.iter().find_map(|&place| {
+                    let gap = (s - place) * speed + near.error.max_element();
+                    self.departure::<R>(at(place), gap, multiples)
+                })
+            });
             if let Some(surface) = found {
                 return surface;
             }
@@ -412,7 +422,7 @@ impl<R: Real> Shape<R> for Julia {
         let normal = normal.unwrap_or(back);
         // Out of what is met, if that is not far.
         let out = (0..8).map(|k| self.params.tolerance * f64::from(1u32 << k));
-        let out = out.into_iter().find_map(|off| self.departure::<R>(point + normal * off, off));
+        let out = out.into_iter().find_map(|off| self.departure::<R>(point + normal * off, off, &[]));
         out.unwrap_or_else(|| {
             let half =
                 point.abs().max_element() * if size_of::<R>() == 4 { f64::from(f32::EPSILON) } else { 0.0 };
