@@ -297,12 +297,11 @@ impl Julia {
         (most > self.params.tolerance && radius > 16.0 * U * p.abs().element_sum()).then_some(radius)
     }
 
-    /// The surface at `p`, outside of what is met by no more than `gap`, with an error that brings rays spawned on the side of its
+    /// The surface at `p` with this normal, outside of what is met by no more than `gap`, with an error that brings rays spawned on the side of its
     /// normal to where they get away, on a way without a point of the set, and does so at these multiples of the error, too; `None`
     /// if none is found.
-    fn departure<R: Real>(&self, p: DVec3, gap: f64, multiples: &[f64]) -> Option<Surface> {
+    fn departure<R: Real>(&self, p: DVec3, normal: DVec3, gap: f64, multiples: &[f64]) -> Option<Surface> {
         let radius = self.leaves(p)?;
-        let normal = self.uphill(p)?;
         let least = gap + p.abs().max_element() * (4.0 * U);
         let clear = |from: DVec3| {
             let way = Ray::new(p, from - p).between(0.0, 1.0);
@@ -375,7 +374,8 @@ impl<R: Real> Primitive<R> for Julia {
 
 impl<R: Real> Shape<R> for Julia {
     /// A point of the ray just outside of where it meets the set; the normal is the gradient of the potential there, by the
-    /// Jacobian of the orbit, and there are no parameters. The error covers the way from there to what is met, not that to the
+    /// Jacobian of the orbit, turned towards the arriving ray in the few crevices where it leads straight into another wall; there
+    /// are no parameters. The error covers the way from there to what is met, not that to the
     /// set itself, which is another [`JuliaParams::tolerance`]; and it is chosen for [`Surface::spawn`], see [`Julia`].
     ///
     /// The ray is followed once more: about as much work as finding the hit. For a hit that `ray` does not have, or has from its
@@ -404,12 +404,18 @@ impl<R: Real> Shape<R> for Julia {
             }
             places.push(before);
             // An instance that turns the box of the error makes the step as long as one side of it, or three.
-            let found = [&[1.0, 1.4, 1.8, 2.2, 2.6, 3.0][..], &[]].into_iter().find_map(|multiples| {
-                places.iter().find_map(|&place| {
-                    let gap = (s - place) * speed + near.error.max_element();
-                    self.departure::<R>(at(place), gap, multiples)
-                })
-            });
+            let turned = &[1.0, 1.4, 1.8, 2.2, 2.6, 3.0][..];
+            let back = -near.dir / speed;
+            // In narrow places the gradient may lead to the other side: then halfway between it and where the ray came from.
+            let found = [(turned, 0.0), (turned, 1.0), (&[], 0.0), (&[], 1.0)].into_iter().find_map(
+                |(multiples, share)| {
+                    places.iter().find_map(|&place| {
+                        let normal = (self.uphill(at(place))? + back * share).try_normalize()?;
+                        let gap = (s - place) * speed + near.error.max_element();
+                        self.departure::<R>(at(place), normal, gap, multiples)
+                    })
+                },
+            );
             if let Some(surface) = found {
                 return surface;
             }
@@ -422,7 +428,7 @@ impl<R: Real> Shape<R> for Julia {
         let normal = normal.unwrap_or(back);
         // Out of what is met, if that is not far.
         let out = (0..8).map(|k| self.params.tolerance * f64::from(1u32 << k));
-        let out = out.into_iter().find_map(|off| self.departure::<R>(point + normal * off, off, &[]));
+        let out = out.into_iter().find_map(|off| self.departure::<R>(point + normal * off, normal, off, &[]));
         out.unwrap_or_else(|| {
             let half =
                 point.abs().max_element() * if size_of::<R>() == 4 { f64::from(f32::EPSILON) } else { 0.0 };

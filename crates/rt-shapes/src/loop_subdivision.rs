@@ -246,7 +246,10 @@ impl fmt::Display for LoopError {
                 write!(f, "the edge from vertex {a} to {b} cannot have the sharpness {sharpness}")
             }
             LoopError::TooManyTriangles { len: usize::MAX } => {
-                write!(f, "that many triangles cannot even be counted: at most {MOST_TRIANGLES} can be numbered")
+                write!(
+                    f,
+                    "that many triangles cannot even be counted: at most {MOST_TRIANGLES} can be numbered"
+                )
             }
             LoopError::TooManyTriangles { len } => {
                 write!(f, "{len} triangles are more than the {MOST_TRIANGLES} that can be numbered")
@@ -494,9 +497,7 @@ impl Refine for LoopTessellation {
             LoopError::TooManyTriangles { len: usize::MAX } => {
                 BuildError::BadParam { name: "level", why: "makes more triangles than can be counted" }
             }
-            LoopError::TooManyTriangles { len } => {
-                BuildError::TooManyPrimitives { len, max: MOST_TRIANGLES }
-            }
+            LoopError::TooManyTriangles { len } => BuildError::TooManyPrimitives { len, max: MOST_TRIANGLES },
             _ => BuildError::BadParam { name: "surface", why: "it is no manifold" },
         })
     }

@@ -166,10 +166,13 @@ mod tests {
                 }
             }
         }
-        let near = Near::new(&Ray::new(DVec3::new(0.3, 1e9, 0.1), DVec3::new(0.1, -0.7, 0.3)), DVec3::ZERO, 1.0);
+        let near =
+            Near::new(&Ray::new(DVec3::new(0.3, 1e9, 0.1), DVec3::new(0.1, -0.7, 0.3)), DVec3::ZERO, 1.0);
         for a in 0..3 {
             let o = [0.3, 1e9, 0.1][a];
-            assert!(off(near.origin[a], o, near.start, near.dir[a]).abs() <= near.error[a] || near.exponent != 0);
+            assert!(
+                off(near.origin[a], o, near.start, near.dir[a]).abs() <= near.error[a] || near.exponent != 0
+            );
         }
     }
 
@@ -182,13 +185,19 @@ mod tests {
             let t = near.t(1.0 / -near.dir.z);
             assert!((t * pace - 1.0).abs() < 1e-15 || t == f64::MAX, "{pace:e} {near:?}");
             assert!(near.before(t) <= near.after(t));
-            assert!(near.before(f64::INFINITY) == f64::INFINITY && near.after(f64::NEG_INFINITY) == f64::NEG_INFINITY);
+            assert!(
+                near.before(f64::INFINITY) == f64::INFINITY
+                    && near.after(f64::NEG_INFINITY) == f64::NEG_INFINITY
+            );
             assert!(near.before(0.0) <= 0.0 && near.after(0.0) >= 0.0);
         }
         for x in [1.0, -3e-300, 1e300, 0.0] {
             assert_eq!(scaled(scaled(x, -20), 20), x);
         }
         assert_eq!(scaled(f64::from_bits(1), 2046), 2f64.powi(972));
-        assert_eq!((binary_exponent(f64::from_bits(1)), binary_exponent(1.5), binary_exponent(f64::MAX)), (-1074, 0, 1023));
+        assert_eq!(
+            (binary_exponent(f64::from_bits(1)), binary_exponent(1.5), binary_exponent(f64::MAX)),
+            (-1074, 0, 1023)
+        );
     }
 }

@@ -202,7 +202,8 @@ fn apart<T: Send>(work: impl FnOnce(Large) -> Result<T, BuildError> + Send) -> R
 }
 
 #[cfg(feature = "parallel")]
-const NO_THREAD: BuildError = BuildError::BadParam { name: "parallel", why: "no thread was to be had to refine on" };
+const NO_THREAD: BuildError =
+    BuildError::BadParam { name: "parallel", why: "no thread was to be had to refine on" };
 
 #[cfg(feature = "parallel")]
 impl Large {
@@ -293,9 +294,9 @@ impl<T: Real, S: Structure, R: Refine<Parts: Surfaced<T>>> Shape<T> for Lazy<S, 
 mod tests {
     use super::*;
     use crate::{Sphere, TriangleMesh};
+    use rayon::prelude::*;
     use rt_accel::Exhaustive;
     use rt_geom::glam::Vec3A;
-    use rayon::prelude::*;
     use std::panic::AssertUnwindSafe;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::mpsc::RecvTimeoutError;
@@ -521,7 +522,8 @@ mod tests {
             fn refine(&self) -> Result<Self::Parts, BuildError> {
                 parallel_work();
                 self.0.fetch_add(1, Ordering::Relaxed);
-                let ball = |i: u8| Balls { count: 1 + i as usize, reach: 1.0 + 3.0 * i as f32, refine: self.1 };
+                let ball =
+                    |i: u8| Balls { count: 1 + i as usize, reach: 1.0 + 3.0 * i as f32, refine: self.1 };
                 Ok((0..3).map(|i| Lazy::new(ball(i), ())).collect())
             }
         }

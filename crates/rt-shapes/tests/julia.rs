@@ -3,11 +3,11 @@
 // The long test, run by hand, says what it found.
 #![allow(clippy::print_stdout)]
 
-use rt_accel::{Hit, Instance};
+use rt_accel::{Hit, Instance, Primitive};
 use rt_geom::glam::{DAffine3, DQuat, DVec3, DVec4};
-use rt_geom::{Real, Transform, Vector};
+use rt_geom::{Ray, Real, Transform, Vector};
 use rt_measure::rays::{self, Seeded};
-use rt_shapes::{Julia, JuliaParams, Shape, Surface, Uv};
+use rt_shapes::{Julia, JuliaCounts, JuliaParams, Shape, Surface, Traced, Uv};
 
 /// Sets with arms, dust, a ball, and a slice off the middle.
 const SETS: [([f64; 4], f64); 6] = [
@@ -35,7 +35,14 @@ struct Found {
 }
 
 /// Sends rays off from every hit of `count` chords, to random directions of the hemisphere.
-fn spawn<R: Real>(shape: &impl Shape<R, At = Uv>, scale: f64, tolerance: f64, count: usize, each: usize, found: &mut Found) {
+fn spawn<R: Real>(
+    shape: &impl Shape<R, At = Uv>,
+    scale: f64,
+    tolerance: f64,
+    count: usize,
+    each: usize,
+    found: &mut Found,
+) {
     let mut seeded = Seeded::new(7);
     for ray in rays::uniform::<R>(5, &shape.world_bound(), count) {
         let Some(hit) = shape.intersect(&ray) else { continue };
@@ -68,7 +75,11 @@ fn spawn<R: Real>(shape: &impl Shape<R, At = Uv>, scale: f64, tolerance: f64, co
 fn leave(count: usize, each: usize, tolerances: &[f64]) -> [Found; 3] {
     let mut all: [Found; 3] = Default::default();
     let scale = 5.0;
-    let map = DAffine3::from_scale_rotation_translation(DVec3::splat(scale), DQuat::from_rotation_x(0.7) * DQuat::from_rotation_z(0.6), DVec3::new(1.0, 2.0, 3.0));
+    let map = DAffine3::from_scale_rotation_translation(
+        DVec3::splat(scale),
+        DQuat::from_rotation_x(0.7) * DQuat::from_rotation_z(0.6),
+        DVec3::new(1.0, 2.0, 3.0),
+    );
     for of in SETS {
         for &tolerance in tolerances {
             let julia = set(of, tolerance);
@@ -76,7 +87,10 @@ fn leave(count: usize, each: usize, tolerances: &[f64]) -> [Found; 3] {
             spawn::<f32>(&julia, 1.0, tolerance, count, each, &mut all[1]);
             let moved = Instance::new(julia, Transform::new(map).unwrap());
             spawn::<f64>(&moved, scale, tolerance, count, each, &mut all[2]);
-            println!("{of:?} {tolerance:e} {:?}", all.each_ref().map(|f| (f.spawned, f.at_once, f.soon, f.near)));
+            println!(
+                "{of:?} {tolerance:e} {:?}",
+                all.each_ref().map(|f| (f.spawned, f.at_once, f.soon, f.near))
+            );
         }
     }
     all
@@ -94,5 +108,64 @@ fn rays_leave_what_they_hit() {
 fn millions_of_rays_leave_what_they_hit() {
     for found in leave(16_000, 16, &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6]) {
         assert!(found.spawned > 400_000 && found.at_once == 0, "{found:?}");
+    }
+}
+
+#[test]
+fn rays_from_anywhere_at_any_pace_meet_the_same() {
+    let (mut hits, mut misses) = (0, 0);
+    for of in SETS {
+        let julia = set(of, 1e-5);
+        let mut seeded = Seeded::new(3);
+        for k in 0..60 {
+            // Through a point by whole numbers of 2^-20, along an axis: the line is the same from any distance.
+            let at =
+                seeded.inside(-DVec3::ONE, DVec3::ONE).map(|x| (x * 2f64.powi(20)).round() / 2f64.powi(20));
+            let (a, b) = ((k % 3) as usize, (k as usize + 1) % 3);
+            let mut dir = DVec3::ZERO;
+            dir[a] = [1.0, -1.0][k as usize / 3 % 2];
+            let mut start = at;
+            start[a] = -3.0 * dir[a];
+            let near = Ray::new(start, dir);
+            let wanted = julia.trace(&near, &mut JuliaCounts::default());
+            for far in [1e4, 1e9, 1e18, 1e100, 1e300] {
+                start[a] = -far * dir[a];
+                for pace in [1.0, 1e-320, 1e-200, 1e120, 1e300] {
+                    let ray = Ray::new(start, dir * pace);
+                    match (wanted, julia.trace(&ray, &mut JuliaCounts::default())) {
+                        (Traced::Missed, Traced::Missed) => misses += 1,
+                        (Traced::Met(_), Traced::Met(t)) => {
+                            hits += 1;
+                            let off = (t * pace - (far - 3.0 + met(wanted))).abs() / far;
+                            assert!(
+                                t == f64::MAX || off < 1e-9 + 1e-5 / far || pace < 1e-300,
+                                "{off} {ray:?}"
+                            );
+                            let hit = julia.intersect(&ray).unwrap();
+                            let surface = julia.surface(&ray, &hit);
+                            // On the same line, wherever `t` says it is.
+                            let off = (surface.point - at) * (DVec3::ONE - dir.abs());
+                            assert!(off.abs().max_element() < 1e-12, "{surface:?} {ray:?}");
+                            assert!(
+                                (surface.point[a] * dir[a] + 3.0 - met(wanted)).abs() < 1e-3,
+                                "{surface:?} {wanted:?}"
+                            );
+                        }
+                        // One more step or less at a graze.
+                        (Traced::Unresolved(_), _) | (_, Traced::Unresolved(_)) => {}
+                        (wanted, found) => panic!("{wanted:?} {found:?} {ray:?} {b}"),
+                    }
+                }
+            }
+        }
+    }
+    println!("{hits} hits, {misses} misses");
+    assert!(hits > 500 && misses > 500, "{hits} {misses}");
+}
+
+fn met(traced: Traced) -> f64 {
+    match traced {
+        Traced::Met(t) | Traced::Unresolved(t) => t,
+        Traced::Missed => f64::NAN,
     }
 }

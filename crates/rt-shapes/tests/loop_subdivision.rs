@@ -2,7 +2,10 @@
 
 use rt_accel::BuildError;
 use rt_geom::glam::DVec3;
-use rt_shapes::{Boundaries, Corners, LoopError, LoopRules, LoopSurface, LoopTessellation, Refine, TriangleMesh, Vertices, Weights};
+use rt_shapes::{
+    Boundaries, Corners, LoopError, LoopRules, LoopSurface, LoopTessellation, Refine, TriangleMesh, Vertices,
+    Weights,
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 type Points = Vec<[f64; 3]>;

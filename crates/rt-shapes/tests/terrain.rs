@@ -257,9 +257,18 @@ fn rays_from_anywhere_at_any_pace_meet_what_the_mesh_says() {
     let (mut hits, mut far) = (0, 0);
     let mut counts = Counts::default();
     for (scale, min) in [(1.0, DVec2::splat(-0.4)), (1e-50, DVec2::ZERO), (1e55, DVec2::splat(-0.9))] {
-        let fractal = Fractal { rise: 0.1 * scale, corners: [0.1, -0.2, 0.0, 0.3].map(|z| z * scale), ..Fractal::default() };
-        let params =
-            TerrainParams { min: min * scale, size: DVec2::splat(scale), level: 3, cached: 1, ..TerrainParams::default() };
+        let fractal = Fractal {
+            rise: 0.1 * scale,
+            corners: [0.1, -0.2, 0.0, 0.3].map(|z| z * scale),
+            ..Fractal::default()
+        };
+        let params = TerrainParams {
+            min: min * scale,
+            size: DVec2::splat(scale),
+            level: 3,
+            cached: 1,
+            ..TerrainParams::default()
+        };
         let terrain = Terrain::new(fractal, params).unwrap();
         let mesh: Mesh = Aggregate::build(terrain.refine().unwrap(), &()).unwrap();
         let rays = from_afar(&terrain, scale, 300);
@@ -272,7 +281,9 @@ fn rays_from_anywhere_at_any_pace_meet_what_the_mesh_says() {
                 hits += 1;
                 far += (ray.origin.abs().max_element() > 1e18 * scale) as usize;
                 // Intervals that end at the hit and before it.
-                for near in [ray.between(hit.t, hit.t), ray.between(0.0, hit.t), ray.between(0.0, hit.t.next_down())] {
+                for near in
+                    [ray.between(hit.t, hit.t), ray.between(0.0, hit.t), ray.between(0.0, hit.t.next_down())]
+                {
                     assert_eq!(terrain.intersect(&near), mesh.intersect(&near), "{near:?}");
                 }
             }
