@@ -86,7 +86,11 @@ fn relief(effort: Effort) -> Result<Group, Trouble> {
         let name = format!("tolerance={tolerance} level={} f64", terrain.params().level);
         let bytes = size(terrain.bytes(), terrain.facet_count() as usize);
         let contender = Contender::new(("terrain", name), (*ms, bytes), terrain);
-        contenders.push(contender.off_by(|ray| off(ray.at(terrain.intersect(ray)?.t))));
+        // The first is right.
+        contenders.push(match contenders.len() {
+            0 => contender,
+            _ => contender.off_by(|ray| off(ray.at(terrain.intersect(ray)?.t))),
+        });
     }
     for (level, (ms, mesh)) in &meshes {
         let (vertices, facets) = (mesh.geometry().vertices().len(), mesh.geometry().triangles().len());

@@ -29,12 +29,14 @@ const FAR: f64 = 1e8;
 /// tolerance. Only the closest hit is reported by [`Primitive::all_hits`]: how often a line crosses such a set is not for finite
 /// arithmetic to say.
 ///
-/// Rays that [`Surface::spawn`] sends off from a hit, to the side of its normal, begin outside of what is met: that is looked at
+/// Rays that [`Surface::spawn`] sends off from a hit of a ray that came from outside, to the side of the normal, begin outside of what
+/// is met, too: that is looked at
 /// when the surface is asked for, at the origins in the precision of the ray and in `f64`, and the way there from the arriving ray is
 /// proved to hold no point of the set. So they neither end where they begin nor come out behind a wall. What they meet later is
 /// as right as for any other ray; that may be soon, the set being rough at every scale. Towards the other side there is only the
-/// set, which is solid: such rays end at once. Moved by an [`Instance`](rt_accel::Instance) origins come to lie elsewhere in the same
-/// ball, unless it stretches more one way than another.
+/// set, which is solid: such rays end at once. An [`Instance`](rt_accel::Instance) that turns the set makes the step up to three times as
+/// long; six such lengths are looked at, too, but that is no proof: of 30 000 hits one had its
+/// rays end where they began.
 ///
 /// ```
 /// use rt_accel::Primitive;
@@ -305,7 +307,8 @@ impl Julia {
         let least = gap + p.abs().max_element() * (4.0 * U);
         let clear = |from: DVec3| {
             let way = Ray::new(p, from - p).between(0.0, 1.0);
-            self.leaves(from).is_some() && self.follow(&way, &mut JuliaCounts::default()).is_none()
+            let near = way.dir.length() < radius * 0.99;
+            self.leaves(from).is_some() && (near || self.follow(&way, &mut JuliaCounts::default()).is_none())
         };
         // Errors of a quarter of the ball first; less in narrow places, more where the ray's own precision is coarse.
         let sizes = [0, -2, -4, -6, 1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28];
@@ -313,9 +316,10 @@ impl Julia {
         errors.into_iter().find_map(|size| {
             let error = DVec3::splat(size);
             let surface = Surface { point: p, error, normal, shading: normal, uv: DVec2::ZERO };
-            let spawned = surface.spawn(R::Vec3::nearest(normal)).origin.widen();
+            let [fine, own] =
+                [surface.spawn(normal).origin, surface.spawn(R::Vec3::nearest(normal)).origin.widen()];
             let all = multiples.iter().all(|k| clear(p + normal * (size * k)));
-            (all && clear(surface.spawn(normal).origin) && clear(spawned)).then_some(surface)
+            (all && clear(fine) && (own == fine || clear(own))).then_some(surface)
         })
     }
 
@@ -378,7 +382,7 @@ impl<R: Real> Shape<R> for Julia {
     /// are no parameters. The error covers the way from there to what is met, not that to the
     /// set itself, which is another [`JuliaParams::tolerance`]; and it is chosen for [`Surface::spawn`], see [`Julia`].
     ///
-    /// The ray is followed once more: about as much work as finding the hit. For a hit that `ray` does not have, or has from its
+    /// The ray is followed once more, and some twenty places are looked at: a third more work than finding the hit. For a hit that `ray` does not have, or has from its
     /// start: the point on the ray, and an error of twice the tolerance or more.
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
         let wide = ray.widen();
@@ -386,36 +390,41 @@ impl<R: Real> Shape<R> for Julia {
         if let Some(End { near, before: Some(before), s, .. }) = end {
             let at = |s: f64| near.origin + near.dir * s;
             let speed = near.dir.length();
+            let back = -near.dir / speed;
+            let tried = |place: f64, multiples: &[f64], share: f64| {
+                let normal = (self.uphill(at(place))? + back * share).try_normalize()?;
+                let gap = (s - place) * speed + near.error.max_element();
+                self.departure::<R>(at(place), normal, gap, multiples)
+            };
+            // An instance that turns the box of the error makes the step as long as one side of it, or three.
+            let turned = &[1.0, 1.4, 1.8, 2.2, 2.6, 3.0][..];
             // Between the last step outside and the end: nearer and nearer to where the ray came to be inside.
             let (mut out, mut inside) = (before, s);
-            let mut places = Vec::new();
-            if self.leaves(at(s)).is_some() {
-                places.push(s);
-            }
-            for near in [0.25, 0.0625, 0.015_625] {
+            let mut places = Vec::with_capacity(5);
+            for gap in [0.0, 0.25, 0.0625, 0.015_625, f64::INFINITY] {
+                if gap == f64::INFINITY {
+                    out = before;
+                } else if gap == 0.0 {
+                    // Out of steps, a ray ends outside.
+                    out = if self.leaves(at(s)).is_some() { s } else { continue };
+                }
                 for _ in 0..64 {
-                    if (inside - out) * speed <= self.params.tolerance * near {
+                    if (inside - out) * speed <= self.params.tolerance * gap {
                         break;
                     }
                     let middle = (out + inside) * 0.5;
                     *(if self.leaves(at(middle)).is_some() { &mut out } else { &mut inside }) = middle;
                 }
+                if let Some(surface) = tried(out, turned, 0.0) {
+                    return surface;
+                }
                 places.push(out);
             }
-            places.push(before);
-            // An instance that turns the box of the error makes the step as long as one side of it, or three.
-            let turned = &[1.0, 1.4, 1.8, 2.2, 2.6, 3.0][..];
-            let back = -near.dir / speed;
             // In narrow places the gradient may lead to the other side: then halfway between it and where the ray came from.
-            let found = [(turned, 0.0), (turned, 1.0), (&[], 0.0), (&[], 1.0)].into_iter().find_map(
-                |(multiples, share)| {
-                    places.iter().find_map(|&place| {
-                        let normal = (self.uphill(at(place))? + back * share).try_normalize()?;
-                        let gap = (s - place) * speed + near.error.max_element();
-                        self.departure::<R>(at(place), normal, gap, multiples)
-                    })
-                },
-            );
+            let rest = [(turned, 1.0), (&[], 0.0), (&[], 1.0)].into_iter();
+            let found = rest
+                .flat_map(|how| places.iter().map(move |&place| (place, how)))
+                .find_map(|(place, (multiples, share))| tried(place, multiples, share));
             if let Some(surface) = found {
                 return surface;
             }

@@ -54,7 +54,9 @@ impl Default for TerrainParams {
 /// a few hundred bytes a level, whatever the number of facets, and there is nothing to build but the cache.
 /// A node is passed over when the ray misses the prism over its triangle that holds everything below it, rounding included
 /// (Kajiya's cheesecake). Facets are decided by [`Triangle`], exactly: so there are no cracks, and hits are those of the explicit
-/// mesh ([`Refine::refine`]), bit for bit, numbers included.
+/// mesh ([`Refine::refine`]), bit for bit, numbers included, for rays from any distance and of any pace: from far away they are
+/// first moved to the terrain, exactly as far as possible, so that they open no more nodes than from nearby. (Beyond `2^300` times a
+/// facet's size from it [`Triangle`] is no longer exact, for the mesh neither.)
 ///
 /// ```
 /// use rt_accel::{Counts, Primitive};

@@ -86,6 +86,8 @@ pub(super) struct Walk<'a, R: Real, H, F> {
     near: Near,
     /// What a coordinate, relative to a vertex, may be off by.
     error: f64,
+    /// What heights may be off by: of vertices, by two roundings a level; of the ray's origin, where that was moved.
+    height_error: f64,
     counts: &'a mut Counts,
     each: F,
 }
@@ -115,7 +117,8 @@ impl<'a, R: Real, H: Heights, F: FnMut(u32, Triangle, &mut Ray<R>) -> ControlFlo
             return ControlFlow::Continue(());
         }
         let error = near.error.max_element() + 8.0 * U * (near.origin.abs().max_element() + size);
-        let mut walk = Walk { terrain, ray, near, error, counts, each };
+        let height_error = 64.0 * f64::EPSILON * terrain.tall + near.error.z;
+        let mut walk = Walk { terrain, ray, near, error, height_error, counts, each };
         let roots = terrain.roots();
         let spans = roots.map(|node| walk.enter(&node, span));
         let order = if spans[0].from <= spans[1].from { [0, 1] } else { [1, 0] };
@@ -186,7 +189,7 @@ impl<'a, R: Real, H: Heights, F: FnMut(u32, Triangle, &mut Ray<R>) -> ControlFlo
         let size = area.abs();
         let slack = 2.0 * bound
             + 4.0 * U * size * (origin.z.abs() + far * dir.z.abs())
-            + size * (64.0 * f64::EPSILON * self.terrain.tall + self.near.error.z)
+            + size * self.height_error
             + (origin.z.abs() + far * dir.z.abs()) * 6.0 * bound_of_area(&p, self.error);
         span.keep(at - reach[0] * area, slope, slack);
         span.keep(reach[1] * area - at, -slope, slack);
@@ -216,7 +219,7 @@ impl Span {
     /// Keeps what fulfils `at + slope t >= -slack`, and a rounding more; products may have underflowed.
     #[inline(always)]
     fn keep(&mut self, at: f64, slope: f64, slack: f64) {
-        let at = at + slack + f64::MIN_POSITIVE;
+        let at = at + (slack + f64::MIN_POSITIVE);
         let t = -at / slope;
         let t = (t, t.abs() * (4.0 * U));
         if slope > 0.0 {
