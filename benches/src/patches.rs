@@ -1,7 +1,8 @@
 //! Patches met directly, or triangles in their place?
 //!
 //! The knob is the number of segments; the errors are those against the patches themselves: rays that hit one and not the
-//! other, and distances.
+//! other, and how far the triangles are, where they are hit, from the points of the patches whose parameters they share. That is
+//! the distance from the surface or more, as a share of the size of the pot, the diagonal of its box.
 
 use crate::contest::{Group, Measured, Weigh, mark_front};
 use crate::{Effort, Trouble, Watch, hear};
@@ -13,7 +14,8 @@ use rt_geom::glam::DVec3;
 use rt_measure::clock::race;
 use rt_measure::error::HitError;
 use rt_measure::rays::{self, Pinhole};
-use rt_shapes::{BezierPatch, Refine, Tessellation};
+use rt_measure::record::ErrorKind;
+use rt_shapes::{BezierPatch, Refine, Shape, Tessellation};
 use std::time::Instant;
 
 /// Segments that are swept.
@@ -41,7 +43,9 @@ pub(crate) fn against(truth: &[Option<f64>], found: &[Option<f64>]) -> HitError 
 
 /// How far a ray goes, counted.
 type Ask<'a> = Box<dyn Fn(&Ray<f64>, &mut Counts) -> Option<f64> + 'a>;
-/// The same for many, for the clock.
+/// How far from the right surface a ray hits, as a share of its size.
+type Off<'a> = Box<dyn Fn(&Ray<f64>) -> Option<f64> + 'a>;
+/// Many rays at once, for the clock.
 type Shoot<'a> = Box<dyn Fn(&[Ray<f64>]) + 'a>;
 
 /// Someone who says how far rays go, with what was counted while building.
@@ -52,6 +56,7 @@ pub(crate) struct Contender<'a> {
     pub(crate) bytes_per_prim: f64,
     pub(crate) ask: Ask<'a>,
     pub(crate) shoot: Shoot<'a>,
+    pub(crate) off: Option<Off<'a>>,
 }
 
 impl<'a> Contender<'a> {
@@ -71,11 +76,17 @@ impl<'a> Contender<'a> {
                     black_box(shape.intersect(ray).map(|hit| hit.t));
                 }
             }),
+            off: None,
         }
+    }
+
+    /// Judged by the distance from the right surface, not by that along rays, which at a graze is any number.
+    pub(crate) fn off_by(self, off: impl Fn(&Ray<f64>) -> Option<f64> + 'a) -> Contender<'a> {
+        Contender { off: Some(Box::new(off)), ..self }
     }
 }
 
-/// Races contenders; the first one is right.
+/// Races contenders; the first one is right. Where one is judged by distances from it, all are.
 pub(crate) fn compare(
     (scene, prims): (&str, usize),
     (kind, rays): (&str, &[Ray<f64>]),
@@ -97,6 +108,11 @@ pub(crate) fn compare(
     }
     let race = race(effort.plan(), &mut runs);
     let n = rays.len().max(1) as f64;
+    let by_distance = contenders.iter().any(|contender| contender.off.is_some());
+    let largest = |contender: &Contender<'_>| {
+        let off = contender.off.as_ref().map(|off| rays.iter().filter_map(off).fold(0.0, f64::max));
+        (ErrorKind::Distance, off.unwrap_or(0.0))
+    };
     let measured = contenders.iter().enumerate().map(|(k, contender)| Measured {
         structure: contender.structure.clone(),
         params: contender.params.clone(),
@@ -108,11 +124,12 @@ pub(crate) fn compare(
         nodes_per_ray: Some(work[k].nodes as f64 / n),
         tests_per_ray: Some(work[k].prims as f64 / n),
         error: against(&said[0], &said[k]),
-        has_t: true,
+        has_t: !by_distance,
+        off: by_distance.then(|| largest(contender)),
         ..Measured::default()
     });
     let mut measured: Vec<Measured> = measured.collect();
-    mark_front(&mut measured, Weigh::Error);
+    mark_front(&mut measured, if by_distance { Weigh::Off } else { Weigh::Error });
     Group {
         scene: scene.into(),
         prims,
@@ -145,15 +162,24 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
         let pot = Tessellation { patches: patches.clone(), segments };
         meshes.push((segments, timed(|| Aggregate::<Bvh, _>::build(pot.refine()?, &params))?));
     }
+    let world = direct.world_bound();
+    let extent = f64::from(world.size().length());
     let direct_bytes = size(direct.structure().bytes() + count * size_of::<BezierPatch>());
     let mut contenders = vec![Contender::new(("patches", "direct f64".into()), (ms, direct_bytes), &direct)];
     for (segments, (ms, mesh)) in &meshes {
         let (vertices, triangles) = (mesh.geometry().vertices().len(), mesh.geometry().triangles().len());
         let bytes = size(mesh.structure().bytes() + vertices * 44 + triangles * 12);
         let name = format!("segments={segments} f64 fast");
-        contenders.push(Contender::new(("triangles", name), (*ms, bytes), mesh));
+        let (patches, corners) = (&patches, ((segments + 1) * (segments + 1)) as usize);
+        let off = move |ray: &Ray<f64>| {
+            let hit = mesh.intersect(ray)?;
+            let surface = mesh.surface(ray, &hit);
+            let first = mesh.geometry().triangles()[hit.at.prim as usize][0];
+            let patch = patches.get(first as usize / corners)?;
+            Some(surface.point.distance(patch.point(surface.uv.x, surface.uv.y)) / extent)
+        };
+        contenders.push(Contender::new(("triangles", name), (*ms, bytes), mesh).off_by(off));
     }
-    let world = direct.world_bound();
     let side = (effort.rays() as f64).sqrt() as usize;
     let camera = Pinhole {
         eye: DVec3::new(4.0, -9.0, 6.0),
@@ -187,6 +213,8 @@ mod tests {
             let measured = group.outcome.unwrap();
             let wrong: Vec<f64> = measured.iter().map(|m| m.error.wrong_per_million()).collect();
             assert!(wrong[0] == 0.0 && wrong[1] > 20.0 * wrong[7], "{wrong:?}");
+            let off: Vec<f64> = measured.iter().map(|m| m.off.unwrap().1).collect();
+            assert!(off[0] == 0.0 && off[1..].windows(2).all(|pair| pair[1] < 0.5 * pair[0]), "{off:?}");
         }
     }
 }

@@ -8,10 +8,14 @@ use rt_measure::front::{Point, front};
 use rt_measure::record::ErrorKind;
 use rt_shapes::{LoopError, LoopSurface, Vertices};
 
+/// Places of a triangle where its distance is measured, along a side; their squares in all.
+const FINENESS: u32 = 3;
+
 /// Both ways to place vertices, level by level, on surfaces with and without boundary.
 ///
 /// `ns` is a triangle's share of making the mesh; limit vertices come with normals, control vertices without. The front weighs the
-/// time of the whole mesh against the largest distance.
+/// time of the whole mesh against the largest distance. Distances are shares of the surface's size, the diagonal of its box: the
+/// largest, and the root of the mean squared one in millionths.
 pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Trouble> {
     let levels = match effort {
         Effort::Quick => 4,
@@ -35,7 +39,7 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
             };
             let race = race(effort.plan(), &mut [&mut limit, &mut control]);
             for (who, vertices) in [Vertices::Limit, Vertices::Control].into_iter().enumerate() {
-                let deviation = surface.deviation(level, vertices, 3).map_err(refused)?;
+                let deviation = surface.deviation(level, vertices, FINENESS).map_err(refused)?;
                 let triangles = deviation.triangles as f64;
                 points.push(Point { time: race.median(who), error: deviation.largest });
                 measured.push(Measured {
@@ -46,7 +50,7 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
                     spread: race.spread(who),
                     speed: race.ratio(0, who),
                     off: Some((ErrorKind::Distance, deviation.largest / size)),
-                    figures: vec![("triangles", triangles), ("rms", deviation.rms / size)],
+                    figures: vec![("triangles", triangles), ("rms_ppm", deviation.rms / size * 1e6)],
                     ..Measured::default()
                 });
             }
@@ -57,9 +61,9 @@ pub(crate) fn ask(effort: Effort, watch: Watch<'_>) -> Result<Vec<Group>, Troubl
         groups.push(Group {
             scene: format!("loop {name}"),
             prims: surface.face_count(),
-            ray_kind: "no rays".into(),
-            rays: 0,
-            judged: 0,
+            ray_kind: "places a triangle".into(),
+            rays: (FINENESS * FINENESS) as usize,
+            judged: (FINENESS * FINENESS) as usize,
             outcome: Ok(measured),
         });
     }
@@ -104,6 +108,11 @@ mod tests {
             assert!(all.len() == 8 && all.iter().any(|m| m.on_front && m.params == "level=3"));
             for (coarse, fine) in all.iter().zip(&all[2..]) {
                 assert!(off(fine) < off(coarse) && fine.ns_per_ray > 0.0, "{coarse:?} {fine:?}");
+                let rms = |m: &Measured| m.figures[1].1;
+                assert!(
+                    rms(fine) < rms(coarse) && rms(fine) > 1.0 && rms(fine) < off(fine) * 1e6,
+                    "{fine:?}"
+                );
             }
         }
         assert!(ask(Effort::Quick, &mut |_| ControlFlow::Break(())).is_err());

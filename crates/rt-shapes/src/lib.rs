@@ -43,6 +43,7 @@ mod clip;
 mod julia;
 mod loop_subdivision;
 mod mesh;
+mod near;
 mod polygon;
 mod quadric;
 mod refine;

@@ -18,6 +18,8 @@ use rt_geom::{Real, f32_above, f32_below, gamma};
 
 /// Coordinates beyond this are refused: sums and products of them would overflow.
 const LARGEST: f64 = 1e70;
+/// Half-edges, three a triangle, have `u32` numbers.
+const MOST_TRIANGLES: usize = u32::MAX as usize / 3;
 /// A crease sharper than this is sharp at every level there is memory for.
 const FOR_EVER: f32 = 32.0;
 
@@ -195,7 +197,7 @@ pub enum LoopError {
     },
     /// More triangles than can be numbered.
     TooManyTriangles {
-        /// How many there are.
+        /// How many there are; the greatest number if that is too small.
         len: usize,
     },
     /// So fine a level takes more memory than allowed.
@@ -243,9 +245,17 @@ impl fmt::Display for LoopError {
             LoopError::BadSharpness { edge: [a, b], sharpness } => {
                 write!(f, "the edge from vertex {a} to {b} cannot have the sharpness {sharpness}")
             }
-            LoopError::TooManyTriangles { len } => write!(f, "{len} triangles are more than can be numbered"),
+            LoopError::TooManyTriangles { len: usize::MAX } => {
+                write!(
+                    f,
+                    "that many triangles cannot even be counted: at most {MOST_TRIANGLES} can be numbered"
+                )
+            }
+            LoopError::TooManyTriangles { len } => {
+                write!(f, "{len} triangles are more than the {MOST_TRIANGLES} that can be numbered")
+            }
             LoopError::OutOfMemory { needed, limit } => {
-                write!(f, "this level takes {needed} bytes, but {limit} are allowed")
+                write!(f, "this level takes {needed} bytes while it is made, but {limit} are allowed")
             }
         }
     }
@@ -328,13 +338,14 @@ impl LoopSurface {
     /// use rt_shapes::{LoopError, LoopSurface};
     /// let flap = LoopSurface::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])?;
     /// assert_eq!(flap.refine::<f64>(5)?.triangles().len(), 1024);
-    /// assert!(matches!(flap.refine::<f64>(40), Err(LoopError::OutOfMemory { .. })));
+    /// assert!(matches!(flap.refine::<f64>(15), Err(LoopError::OutOfMemory { .. })));
+    /// assert_eq!(flap.refine::<f64>(16).unwrap_err(), LoopError::TooManyTriangles { len: 1 << 32 });
     /// # Ok::<(), LoopError>(())
     /// ```
     ///
     /// # Errors
     ///
-    /// When that takes more memory than allowed.
+    /// When that takes more memory than allowed, or has more triangles than can be numbered.
     pub fn refine<V: Real>(&self, level: u32) -> Result<TriangleMesh<V>, LoopError> {
         let net = self.net_at(level)?;
         let mut corners = net.corners.clone();
@@ -371,7 +382,7 @@ impl LoopSurface {
     ///
     /// # Errors
     ///
-    /// When that takes more memory than allowed.
+    /// When that takes more memory than allowed, or has more triangles than can be numbered.
     pub fn control<V: Real>(&self, level: u32) -> Result<TriangleMesh<V>, LoopError> {
         let net = self.net_at(level)?;
         let points = net.points.iter().map(|&p| narrow(p)).collect();
@@ -385,21 +396,24 @@ impl LoopSurface {
         if self.net.corners.is_empty() {
             return Ok(self.net.clone());
         }
+        // All levels are counted before one is made. First what no memory would help against.
+        let len = match 2u32.checked_mul(level).and_then(|shift| 1usize.checked_shl(shift)) {
+            Some(times) => self.face_count().saturating_mul(times),
+            None => usize::MAX,
+        };
+        if len > MOST_TRIANGLES {
+            return Err(LoopError::TooManyTriangles { len });
+        }
         let (mut faces, mut vertices) = (self.face_count() as u64, self.net.points.len() as u64);
         let boundary = (0..).zip(&self.net.twin).filter(|&(h, &twin)| h == twin).count() as u64;
         let mut edges = (3 * faces + boundary) / 2;
         for _ in 0..level {
             (vertices, edges, faces) = (vertices + edges, 2 * edges + 3 * faces, 4 * faces);
-            let needed = self.bytes(faces, vertices);
-            if needed > self.memory_limit as u64 {
-                let needed = usize::try_from(needed).unwrap_or(usize::MAX);
-                return Err(LoopError::OutOfMemory { needed, limit: self.memory_limit });
-            }
-            if 3 * faces > u32::MAX as u64 {
-                return Err(LoopError::TooManyTriangles {
-                    len: usize::try_from(faces).unwrap_or(usize::MAX),
-                });
-            }
+        }
+        let needed = self.bytes(faces, vertices);
+        if level > 0 && needed > self.memory_limit as u64 {
+            let needed = usize::try_from(needed).unwrap_or(usize::MAX);
+            return Err(LoopError::OutOfMemory { needed, limit: self.memory_limit });
         }
         let mut net = self.net.clone();
         for _ in 0..level {
@@ -480,9 +494,10 @@ impl Refine for LoopTessellation {
     fn refine(&self) -> Result<TriangleMesh, BuildError> {
         self.surface.refine(self.level).map_err(|error| match error {
             LoopError::OutOfMemory { needed, limit } => BuildError::OutOfMemory { needed, limit },
-            LoopError::TooManyTriangles { len } => {
-                BuildError::TooManyPrimitives { len, max: u32::MAX as usize / 3 }
+            LoopError::TooManyTriangles { len: usize::MAX } => {
+                BuildError::BadParam { name: "level", why: "makes more triangles than can be counted" }
             }
+            LoopError::TooManyTriangles { len } => BuildError::TooManyPrimitives { len, max: MOST_TRIANGLES },
             _ => BuildError::BadParam { name: "surface", why: "it is no manifold" },
         })
     }

@@ -44,14 +44,18 @@ impl From<MeshError> for BuildError {
 /// Ask it from any number of threads. Afterwards a query costs one load more than the parts alone: there is no lock on the way of a
 /// ray. Before, a ray that misses the bound costs a box test, so that surfaces no ray comes near cost neither time nor memory.
 ///
-/// *Threads that arrive while another refines do not wait for it: they refine, too, and the first to finish provides the parts for
-/// all.* Whoever waits could do nothing else meanwhile, so that time is not lost, only memory, and that not for long. And waiting
-/// could last forever: a parallel build borrows threads, and a thread that lends itself while it waits may pick up a ray that
-/// reaches the surface it is building.
+/// *Refinement happens once.* Threads that arrive meanwhile wait for it, and do nothing else. Nor does the thread that
+/// refines: were it to lend itself to others while a parallel build borrows threads, it could pick up a ray that reaches the
+/// surface it is building, or borrow a thread that waits for it, and neither would ever end. So the work is done on
+/// threads of its own, where there are no rays: one to refine, as many as the caller's pool has to build over 65 536 parts or
+/// more. They cost some 0.1 ms, a build of a few hundred triangles. [`Refine::refine`] is free to use rayon, but must not wait for
+/// a pool that rays are shot in, nor shoot rays at surfaces that wait for its own. Without the feature `parallel` all is done in
+/// place, and neither [`Refine::refine`] nor the build may use rayon.
 ///
-/// **If refinement fails**, for want of memory or because parts stick out of the bound, every ray misses the surface, now and
-/// later, and nothing is tried again. [`Lazy::refined`] says so after rendering; [`Lazy::refine_now`] says so before.
-/// [`Lazy::update`] changes the surface and forgets the failure.
+/// **If refinement fails**, for want of memory or of threads, or because parts stick out of the bound, every ray misses the
+/// surface, now and later, and nothing is tried again. [`Lazy::refined`] says so after rendering; [`Lazy::refine_now`] says so
+/// before. [`Lazy::update`] changes the surface and forgets the failure. If it panics, so does the query that began it, and the
+/// next one tries again.
 ///
 /// ```
 /// use rt_accel::{BuildError, Exhaustive, Primitive, WorldBound};
@@ -86,7 +90,7 @@ impl From<MeshError> for BuildError {
 /// assert_eq!(refined(), 2);
 /// ```
 ///
-/// Source: Pharr, Humphreys, *Physically Based Rendering* (2004), section 4.1, there with a lock.
+/// Source: Pharr, Humphreys, *Physically Based Rendering* (2004), section 4.1.
 #[derive(Debug)]
 pub struct Lazy<S: Structure, R: Refine> {
     surface: R,
@@ -119,16 +123,11 @@ impl<S: Structure, R: Refine> Lazy<S, R> {
     /// Those of [`Refine::refine`] and of the build; [`BuildError::BadParam`] named `world_bound` when a part sticks out of
     /// the bound of the surface, because rays that meet it there would have been turned away.
     pub fn refine_now(&self) -> Result<&Aggregate<S, R::Parts>, &BuildError> {
-        if self.parts.get().is_none() {
-            // Whoever is first; the others' work is the same.
-            let _ = self.parts.set(self.build());
-        }
-        // Set above, by this thread or another.
-        self.parts.get().unwrap_or(&Err(BuildError::Cancelled)).as_ref()
+        self.parts.get_or_init(|| apart(|large| self.build(large))).as_ref()
     }
 
     #[cold]
-    fn build(&self) -> Result<Aggregate<S, R::Parts>, BuildError> {
+    fn build(&self, large: Large) -> Result<Aggregate<S, R::Parts>, BuildError> {
         let parts = self.surface.refine()?;
         let sticks_out = |prim: u32| {
             let bound = parts.bound(prim);
@@ -140,7 +139,10 @@ impl<S: Structure, R: Refine> Lazy<S, R> {
                 why: "does not contain what it was refined to",
             });
         }
-        Aggregate::build(parts, &self.params)
+        if parts.prim_count() < LARGE {
+            return Aggregate::build(parts, &self.params);
+        }
+        large.run(|| Aggregate::build(parts, &self.params))?
     }
 
     /// Changes the surface, and forgets what it was refined to. A structure above has to be refitted.
@@ -171,6 +173,56 @@ impl<S: Structure, R: Refine> Lazy<S, R> {
         ray.is_valid()
             && self.bound.is_valid()
             && SlabRay::new(ray, DVec3::ZERO, &self.bound).entry(&self.bound).is_some()
+    }
+}
+
+/// So many parts are built over on several threads: below, these cost more than they save.
+const LARGE: usize = 1 << 16;
+
+/// Threads for large builds.
+#[derive(Clone, Copy)]
+struct Large {
+    #[cfg(feature = "parallel")]
+    threads: usize,
+}
+
+/// Does some work in a pool of one new thread: whatever is parallel in it finds no task but its own. The caller sleeps.
+#[cfg(feature = "parallel")]
+fn apart<T: Send>(work: impl FnOnce(Large) -> Result<T, BuildError> + Send) -> Result<T, BuildError> {
+    let large = Large { threads: rayon::current_num_threads() };
+    let alone = || Large { threads: 1 }.run(|| work(large)).flatten();
+    if rayon::current_thread_index().is_none() {
+        return alone();
+    }
+    // A thread of a pool would look for other work while it waits for another pool. It does not while it waits for a thread.
+    std::thread::scope(|scope| match std::thread::Builder::new().spawn_scoped(scope, alone) {
+        Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+        Err(_) => Err(NO_THREAD),
+    })
+}
+
+#[cfg(feature = "parallel")]
+const NO_THREAD: BuildError =
+    BuildError::BadParam { name: "parallel", why: "no thread was to be had to refine on" };
+
+#[cfg(feature = "parallel")]
+impl Large {
+    /// Does some work in a new pool. To be called where a thread that waits finds no rays: outside of pools, or in one of ours.
+    fn run<T: Send>(self, work: impl FnOnce() -> T + Send) -> Result<T, BuildError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
+        Ok(pool.map_err(|_| NO_THREAD)?.install(work))
+    }
+}
+
+#[cfg(not(feature = "parallel"))]
+fn apart<T>(work: impl FnOnce(Large) -> Result<T, BuildError>) -> Result<T, BuildError> {
+    work(Large {})
+}
+
+#[cfg(not(feature = "parallel"))]
+impl Large {
+    fn run<T>(self, work: impl FnOnce() -> T) -> Result<T, BuildError> {
+        Ok(work())
     }
 }
 
@@ -242,10 +294,13 @@ impl<T: Real, S: Structure, R: Refine<Parts: Surfaced<T>>> Shape<T> for Lazy<S, 
 mod tests {
     use super::*;
     use crate::{Sphere, TriangleMesh};
+    use rayon::prelude::*;
     use rt_accel::Exhaustive;
     use rt_geom::glam::Vec3A;
-    use std::sync::Barrier;
+    use std::panic::AssertUnwindSafe;
     use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::mpsc::RecvTimeoutError;
+    use std::time::Duration;
 
     /// Balls along x in a box, refined as told.
     struct Balls<'a> {
@@ -315,23 +370,110 @@ mod tests {
         assert!(balls.intersect_p(&at(3.0)) && balls.world_bound().max.x == 4.0);
     }
 
-    #[test]
-    fn nobody_waits_for_anybody() {
-        // Refinement that ends only when another thread has begun it, too: who waited for the first would wait forever.
-        let both = Barrier::new(2);
-        let refine = || {
-            both.wait();
-            Ok(())
-        };
-        let balls = Lazy::<Exhaustive, _>::new(Balls { count: 3, reach: 7.0, refine: &refine }, ());
-        let found = std::thread::scope(|scope| {
-            let ask = || {
-                scope.spawn(|| (balls.intersect(&at(6.0)), balls.refine_now().unwrap() as *const _ as usize))
-            };
-            [ask(), ask()].map(|thread| thread.join().unwrap())
+    /// Fails rather than hangs.
+    fn in_time(work: impl FnOnce() + Send + 'static) {
+        let (done, over) = std::sync::mpsc::channel();
+        let thread = std::thread::spawn(move || {
+            work();
+            let _ = done.send(());
         });
-        assert_eq!(found[0], found[1]);
-        assert_eq!(found[0].0.unwrap().at.prim, 2);
+        match over.recv_timeout(Duration::from_secs(60)) {
+            Err(RecvTimeoutError::Timeout) => panic!("nobody ever ends"),
+            _ => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+        }
+    }
+
+    /// Work that lends itself to whoever looks for some, for as long as it takes the others to come along.
+    fn parallel_work() {
+        (0..64).into_par_iter().for_each(|_| std::thread::sleep(Duration::from_micros(200)));
+    }
+
+    #[test]
+    fn refinement_happens_once_whoever_asks() {
+        in_time(|| {
+            for round in 0..20 {
+                let calls = AtomicUsize::new(0);
+                let refine = || {
+                    parallel_work();
+                    calls.fetch_add(1, Ordering::Relaxed);
+                    Ok(())
+                };
+                let balls = Lazy::<Exhaustive, _>::new(Balls { count: 3, reach: 7.0, refine: &refine }, ());
+                let ask = |k: usize| {
+                    let hit = balls.intersect(&at((k % 3) as f32 * 3.0));
+                    assert_eq!(hit.map(|hit| hit.at.prim), Some(k as u32 % 3));
+                };
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(1 + round % 4).build().unwrap();
+                std::thread::scope(|scope| {
+                    if round % 2 == 0 {
+                        (0..4).for_each(|k| drop(scope.spawn(move || (0..100).for_each(|i| ask(k + i)))));
+                    }
+                    pool.install(|| (0..1000).into_par_iter().for_each(ask));
+                    // In the pool that is everybody's.
+                    (0..1000).into_par_iter().for_each(ask);
+                });
+                assert_eq!(calls.load(Ordering::Relaxed), 1);
+            }
+        });
+    }
+
+    #[test]
+    fn many_surfaces_refine_at_once_in_few_threads() {
+        in_time(|| {
+            let calls = AtomicUsize::new(0);
+            let refine = || {
+                parallel_work();
+                calls.fetch_add(1, Ordering::Relaxed);
+                Ok(())
+            };
+            let all: Vec<_> = (0..8)
+                .map(|_| Lazy::<Exhaustive, _>::new(Balls { count: 3, reach: 7.0, refine: &refine }, ()))
+                .collect();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+            pool.install(|| {
+                (0..400).into_par_iter().for_each(|k: usize| {
+                    // Near and far, forward and backward, so that they wait for each other crosswise.
+                    let (a, b) = rayon::join(
+                        || all[k % 8].intersect_p(&at(0.0)),
+                        || all[7 - k % 8].intersect_p(&at(3.0)),
+                    );
+                    assert!(a && b);
+                });
+            });
+            assert_eq!(calls.load(Ordering::Relaxed), 8);
+        });
+    }
+
+    #[test]
+    fn large_builds_have_threads_of_their_own() {
+        in_time(|| {
+            let balls = Lazy::<Exhaustive, _>::new(Balls { count: LARGE, reach: 3e5, refine: &PLAIN }, ());
+            (0..64).into_par_iter().for_each(|_| assert!(balls.intersect_p(&at(3.0))));
+            let threads = apart(|large| {
+                let own = rayon::current_num_threads();
+                large.run(|| (own, rayon::current_num_threads()))
+            });
+            assert_eq!(threads, Ok((1, rayon::current_num_threads())));
+        });
+    }
+
+    #[test]
+    fn a_panic_is_the_askers_and_the_next_one_tries_again() {
+        in_time(|| {
+            let calls = AtomicUsize::new(0);
+            let refine = || match calls.fetch_add(1, Ordering::SeqCst) {
+                0 => std::panic::panic_any("spoilt"),
+                _ => Ok(()),
+            };
+            let balls = Lazy::<Exhaustive, _>::new(Balls { count: 3, reach: 7.0, refine: &refine }, ());
+            let ask = || std::panic::catch_unwind(AssertUnwindSafe(|| balls.intersect_p(&at(6.0))));
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+            let asked: Vec<_> = pool.install(|| (0..50).into_par_iter().map(|_| ask()).collect());
+            let panicked: Vec<_> = asked.iter().filter_map(|answer| answer.as_ref().err()).collect();
+            assert_eq!(panicked.len(), 1);
+            assert_eq!(panicked[0].downcast_ref::<&str>(), Some(&"spoilt"));
+            assert!(asked.iter().flatten().all(|&hit| hit) && calls.load(Ordering::SeqCst) == 2);
+        });
     }
 
     /// Refined into what is itself refined later.
@@ -364,6 +506,41 @@ mod tests {
         );
         assert!(Primitive::<f64>::intersect_p(&world, &at(0.0).widen()));
         assert!((Shape::surface(&world, &at(6.0), &hit).point.z - 0.75f64.sqrt()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn nested_surfaces_refine_once_each() {
+        /// As [`Row`], counted.
+        struct Counted<'a>(&'a AtomicUsize, &'a (dyn Fn() -> Result<(), BuildError> + Sync + Send));
+        impl WorldBound for Counted<'_> {
+            fn world_bound(&self) -> Aabb {
+                Row.world_bound()
+            }
+        }
+        impl<'a> Refine for Counted<'a> {
+            type Parts = Vec<Lazy<Exhaustive, Balls<'a>>>;
+            fn refine(&self) -> Result<Self::Parts, BuildError> {
+                parallel_work();
+                self.0.fetch_add(1, Ordering::Relaxed);
+                let ball =
+                    |i: u8| Balls { count: 1 + i as usize, reach: 1.0 + 3.0 * i as f32, refine: self.1 };
+                Ok((0..3).map(|i| Lazy::new(ball(i), ())).collect())
+            }
+        }
+        in_time(|| {
+            let (outer, inner) = (AtomicUsize::new(0), AtomicUsize::new(0));
+            let refine = || {
+                parallel_work();
+                inner.fetch_add(1, Ordering::Relaxed);
+                Ok(())
+            };
+            let row = Lazy::<Exhaustive, _>::new(Counted(&outer, &refine), ());
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+            pool.install(|| {
+                (0..300).into_par_iter().for_each(|k| assert!(row.intersect_p(&at((k % 3) as f32 * 3.0))))
+            });
+            assert_eq!((outer.into_inner(), inner.into_inner()), (1, 3));
+        });
     }
 
     #[test]

@@ -25,15 +25,24 @@ pub struct TerrainParams {
     /// Cutting stops before `level` where all further levels together displace nothing by more than this; 0 for never. The
     /// level is the same everywhere, so that no cracks open; nothing is lost of the surface but that displacement.
     pub tolerance: f64,
-    /// Levels whose nodes keep the exact reach of their heights: some `43 * 4^cached` bytes, and time to compute. The other
+    /// Levels whose nodes keep the exact reach of their heights: some `11 * 4^cached` bytes, and time to compute. The other
     /// levels know the bounds of the displacements only, which are some ten times as wide. At most `level`.
     pub cached: u32,
+    /// Bytes that the cache may take, and [`Refine::refine`] besides.
+    pub memory_limit: usize,
 }
 
 impl Default for TerrainParams {
-    /// The unit square, half a million facets, 175 kB of cached reach.
+    /// The unit square, half a million facets, 44 kB of cached reach, two gibibytes at most.
     fn default() -> TerrainParams {
-        TerrainParams { min: DVec2::ZERO, size: DVec2::ONE, level: 9, tolerance: 0.0, cached: 6 }
+        TerrainParams {
+            min: DVec2::ZERO,
+            size: DVec2::ONE,
+            level: 9,
+            tolerance: 0.0,
+            cached: 6,
+            memory_limit: 1 << 31,
+        }
     }
 }
 
@@ -45,7 +54,9 @@ impl Default for TerrainParams {
 /// a few hundred bytes a level, whatever the number of facets, and there is nothing to build but the cache.
 /// A node is passed over when the ray misses the prism over its triangle that holds everything below it, rounding included
 /// (Kajiya's cheesecake). Facets are decided by [`Triangle`], exactly: so there are no cracks, and hits are those of the explicit
-/// mesh ([`Refine::refine`]), bit for bit, numbers included.
+/// mesh ([`Refine::refine`]), bit for bit, numbers included, for rays from any distance and of any pace: from far away they are
+/// first moved to the terrain, exactly as far as possible, so that they open no more nodes than from nearby. (Beyond `2^300` times a
+/// facet's size from it [`Triangle`] is no longer exact, for the mesh neither.)
 ///
 /// ```
 /// use rt_accel::{Counts, Primitive};
@@ -88,7 +99,7 @@ impl<H: Heights> Terrain<H> {
     /// steps vanish, or a level out of range; those of the heights; [`BuildError::OutOfMemory`] for the cache.
     pub fn new(heights: H, params: TerrainParams) -> Result<Terrain<H>, BuildError> {
         let bad = |name, why| Err(BuildError::BadParam { name, why });
-        let TerrainParams { min, size, level, tolerance, cached } = params;
+        let TerrainParams { min, size, level, tolerance, cached, .. } = params;
         if level > DEEPEST {
             return bad("level", "must lie in 0..=15");
         }
@@ -118,10 +129,8 @@ impl<H: Heights> Terrain<H> {
     fn fill(&mut self) -> Result<(), BuildError> {
         let count = first_of(self.params.cached);
         let mut reach: Vec<[f64; 2]> = Vec::new();
-        let needed = count.saturating_mul(size_of::<[f64; 2]>());
-        reach
-            .try_reserve_exact(count)
-            .map_err(|_| BuildError::OutOfMemory { needed, limit: isize::MAX as usize })?;
+        self.allow(count.saturating_mul(size_of::<[f64; 2]>()))?;
+        reach.try_reserve_exact(count).map_err(|_| refused(count.saturating_mul(size_of::<[f64; 2]>())))?;
         reach.resize(count, [0.0; 2]);
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for node in self.roots() {
@@ -139,6 +148,12 @@ impl<H: Heights> Terrain<H> {
         let [min, max] = [self.place([0, 0]), self.place([walk::FULL; 2])];
         self.bound = [min.extend(low - slack), max.extend(high + slack)];
         Ok(())
+    }
+
+    /// Whether so many bytes may be taken.
+    fn allow(&self, needed: usize) -> Result<(), BuildError> {
+        let limit = self.params.memory_limit;
+        if needed > limit { Err(BuildError::OutOfMemory { needed, limit }) } else { Ok(()) }
     }
 
     fn reach_of(&self, node: &Node, reach: &mut [[f64; 2]]) -> [f64; 2] {
@@ -219,6 +234,11 @@ impl<H: Heights> Terrain<H> {
     fn triangle(&self, node: &Node) -> Triangle {
         Triangle { corners: core::array::from_fn(|k| self.place(node.at[k]).extend(node.z[k])) }
     }
+}
+
+/// The system has not so many bytes: fewer, it does not say how many.
+fn refused(needed: usize) -> BuildError {
+    BuildError::OutOfMemory { needed, limit: needed.saturating_sub(1) }
 }
 
 /// The number of nodes above a level.
@@ -316,12 +336,13 @@ impl<H: Heights> Refine for Terrain<H> {
     ///
     /// # Errors
     ///
-    /// [`BuildError::OutOfMemory`].
+    /// [`BuildError::OutOfMemory`]: more than [`TerrainParams::memory_limit`], or more than there is.
     fn refine(&self) -> Result<TriangleMesh<f64>, BuildError> {
         let (side, level) = ((1u32 << self.params.level) + 1, self.params.level);
         let (corners, facets) = (side as usize * side as usize, self.facet_count() as usize);
         let needed = corners.saturating_mul(24).saturating_add(facets.saturating_mul(12));
-        let short = |_| BuildError::OutOfMemory { needed, limit: isize::MAX as usize };
+        self.allow(needed)?;
+        let short = |_| refused(needed);
         let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
         vertices.try_reserve_exact(corners).map_err(short)?;
         triangles.try_reserve_exact(facets).map_err(short)?;

@@ -1,7 +1,11 @@
 //! Loop surfaces against what is known of them: the box spline, their own refinements, symmetry, topology.
 
+use rt_accel::BuildError;
 use rt_geom::glam::DVec3;
-use rt_shapes::{Boundaries, Corners, LoopError, LoopRules, LoopSurface, TriangleMesh, Vertices, Weights};
+use rt_shapes::{
+    Boundaries, Corners, LoopError, LoopRules, LoopSurface, LoopTessellation, Refine, TriangleMesh, Vertices,
+    Weights,
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 type Points = Vec<[f64; 3]>;
@@ -500,14 +504,23 @@ fn what_is_no_manifold_is_refused_by_name() {
     );
     assert!(triangle().with_creases(&[([1, 0], f32::NAN)]).is_err());
     assert!(triangle().with_creases(&[([0, 1], -1.0)]).is_err());
-    for level in [15, 16, 31, 32, u32::MAX] {
-        let refused = triangle().refine::<f32>(level).unwrap_err();
-        assert!(matches!(refused, LoopError::OutOfMemory { .. }), "{refused:?}");
-        assert!(matches!(
-            triangle().with_memory_limit(usize::MAX).deviation(u32::MAX, Vertices::Limit, 1),
-            Err(LoopError::TooManyTriangles { .. })
-        ));
+    // The figures are those of the level asked for, whatever stands in its way.
+    let refused = |level| triangle().refine::<f32>(level).unwrap_err();
+    for (level, fewer, more) in [(13, 1u64 << 31, 1u64 << 34), (15, 1 << 36, 1 << 38)] {
+        let LoopError::OutOfMemory { needed, limit } = refused(level) else { panic!("{:?}", refused(level)) };
+        assert!((fewer..more).contains(&(needed as u64)) && limit == 1 << 31, "{needed}");
     }
+    assert_eq!(refused(16), LoopError::TooManyTriangles { len: 1 << 32 });
+    for level in [32, 40, u32::MAX] {
+        assert_eq!(refused(level), LoopError::TooManyTriangles { len: usize::MAX });
+        assert!(refused(level).to_string().contains("cannot even be counted"), "{}", refused(level));
+        let tessellation = LoopTessellation { surface: triangle(), level };
+        assert!(matches!(Refine::refine(&tessellation), Err(BuildError::BadParam { name: "level", .. })));
+    }
+    assert!(matches!(
+        triangle().with_memory_limit(usize::MAX).deviation(u32::MAX, Vertices::Limit, 1),
+        Err(LoopError::TooManyTriangles { .. })
+    ));
     assert!(triangle().with_memory_limit(1000).refine::<f32>(3).is_err());
     let nothing = surface((vec![], vec![]));
     assert_eq!(nothing.refine::<f32>(u32::MAX).unwrap().triangles().len(), 0);

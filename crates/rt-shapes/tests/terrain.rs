@@ -4,9 +4,10 @@
 #![allow(clippy::print_stdout)]
 
 use core::ops::ControlFlow;
-use rt_accel::{Aggregate, Counts, Exhaustive, Hit, Primitive, WorldBound};
+use rt_accel::{Aggregate, BuildError, Counts, Exhaustive, Hit, Primitive, WorldBound};
 use rt_geom::glam::{DVec2, DVec3};
 use rt_geom::{Ray, Real, Vector};
+use rt_measure::error::HitError;
 use rt_measure::rays::{self, Seeded};
 use rt_shapes::{
     Fractal, Heights, Lazy, Refine, Samples, Shape, Surfaced, Terrain, TerrainParams, TriangleMesh, Uv,
@@ -198,6 +199,19 @@ fn bad_parameters_are_named() {
 }
 
 #[test]
+fn what_takes_too_much_memory_is_refused_in_true_figures() {
+    let refused = hills(15, 6).refine().unwrap_err();
+    let side = (1 << 15) + 1;
+    assert_eq!(refused, BuildError::OutOfMemory { needed: side * side * 24 + (12 << 31), limit: 1 << 31 });
+    let params = TerrainParams { level: 15, cached: 15, ..TerrainParams::default() };
+    let refused = Terrain::new(Fractal::default(), params).unwrap_err();
+    assert_eq!(refused, BuildError::OutOfMemory { needed: ((1 << 30) - 1) / 3 * 32, limit: 1 << 31 });
+    let little = TerrainParams { memory_limit: 1 << 20, ..TerrainParams::default() };
+    let terrain = Terrain::new(Fractal::default(), little).unwrap();
+    assert!(terrain.bytes() < 1 << 16 && terrain.refine().is_err());
+}
+
+#[test]
 fn terrains_refine_lazily() {
     let lazy = Lazy::<Exhaustive, _>::new(hills(5, 3), ());
     let terrain = hills(5, 3);
@@ -211,4 +225,109 @@ fn terrains_refine_lazily() {
         }
     }
     assert!(hits > 30);
+}
+
+/// Rays through points of the terrain from as far away as triangles promise to be exact, at any pace; along axes, diagonals and
+/// anywhere.
+fn from_afar(terrain: &Terrain<Fractal>, scale: f64, count: usize) -> Vec<Ray<f64>> {
+    let mut seeded = Seeded::new(11);
+    let TerrainParams { min, size, .. } = *terrain.params();
+    let tall = 0.3 * scale;
+    let mut rays = Vec::new();
+    for k in 0..count {
+        let at = seeded.inside(min.extend(-tall), (min + size).extend(tall));
+        let dir = match k % 5 {
+            0 => -DVec3::Z,
+            1 => DVec3::new(0.0, if k % 2 == 0 { 1.0 } else { -1.0 }, 0.0),
+            2 => DVec3::new(0.5, -0.25, -1.0),
+            _ => seeded.inside(-DVec3::ONE, DVec3::ONE),
+        };
+        let far = [0.0, 1.0, 1e6, 1e9, 1e15, 1e20, 1e30, 1e40, 1e60, 1e80][k / 5 % 10];
+        // From so far that `at` leaves no trace: through zero, exactly, or along an axis through `at`.
+        let far = 2f64.powf(f64::log2(far).floor().max(-60.0)) * scale;
+        let origin = at - dir * far;
+        let pace = [1.0, 1e-320, 1e-300, 1e-120, 1e120, 1e307][k / 50 % 6];
+        rays.push(Ray::new(origin, dir * pace));
+    }
+    rays
+}
+
+#[test]
+fn rays_from_anywhere_at_any_pace_meet_what_the_mesh_says() {
+    let (mut hits, mut far) = (0, 0);
+    let mut counts = Counts::default();
+    for (scale, min) in [(1.0, DVec2::splat(-0.4)), (1e-50, DVec2::ZERO), (1e55, DVec2::splat(-0.9))] {
+        let fractal = Fractal {
+            rise: 0.1 * scale,
+            corners: [0.1, -0.2, 0.0, 0.3].map(|z| z * scale),
+            ..Fractal::default()
+        };
+        let params = TerrainParams {
+            min: min * scale,
+            size: DVec2::splat(scale),
+            level: 3,
+            cached: 1,
+            ..TerrainParams::default()
+        };
+        let terrain = Terrain::new(fractal, params).unwrap();
+        let mesh: Mesh = Aggregate::build(terrain.refine().unwrap(), &()).unwrap();
+        let rays = from_afar(&terrain, scale, 300);
+        for ray in &rays {
+            let wanted = mesh.intersect(ray);
+            assert_eq!(terrain.intersect_counted(ray, &mut counts), wanted, "{ray:?}");
+            assert_eq!(terrain.intersect_p(ray), wanted.is_some(), "{ray:?}");
+            assert_eq!(all(&terrain, ray), all(&mesh, ray), "{ray:?}");
+            if let Some(hit) = wanted {
+                hits += 1;
+                far += (ray.origin.abs().max_element() > 1e18 * scale) as usize;
+                // Intervals that end at the hit and before it.
+                for near in
+                    [ray.between(hit.t, hit.t), ray.between(0.0, hit.t), ray.between(0.0, hit.t.next_down())]
+                {
+                    assert_eq!(terrain.intersect(&near), mesh.intersect(&near), "{near:?}");
+                }
+            }
+        }
+    }
+    println!("{hits} hits, {far} of them from far away, {counts:?}");
+    assert!(hits > 200 && far > 80, "{hits} {far}");
+}
+
+#[test]
+fn rays_from_anywhere_are_right_by_exact_arithmetic() {
+    let terrain = Terrain::new(
+        Fractal { corners: [0.1, -0.2, 0.0, 0.3], ..Fractal::default() },
+        TerrainParams { min: DVec2::splat(-0.4), level: 3, cached: 1, ..TerrainParams::default() },
+    )
+    .unwrap();
+    let facets: Vec<_> = (0..terrain.facet_count())
+        .map(|prim| terrain.facet(prim).unwrap().corners.map(|corner| corner.to_array()))
+        .collect();
+    // Distances below the normal range are rounded twice.
+    let mut errors = [HitError::default(); 2];
+    for ray in from_afar(&terrain, 1.0, 600) {
+        let hit = terrain.intersect(&ray);
+        let error = &mut errors[usize::from(hit.is_some_and(|hit| hit.t < f64::MIN_POSITIVE))];
+        error.judge_triangles(&ray, &facets, hit.map(|hit| (hit.at.prim, hit.t)));
+    }
+    let [normal, tiny] = errors;
+    assert!(normal.rays > 500 && normal.is_exact() && normal.t_ulp <= 0.5, "{normal:?}");
+    assert!(tiny.rays > 0 && tiny.is_exact() && tiny.t_ulp < 1.0, "{tiny:?}");
+}
+
+#[test]
+fn a_deep_terrain_is_asked_from_afar_without_being_searched() {
+    let terrain = hills(15, 6);
+    for (far, most) in [(1e3, 60), (1e9, 60), (1e20, 200), (1e60, 200), (1e200, 200)] {
+        let far = 2f64.powf(f64::log2(far).floor());
+        let mut counts = Counts::default();
+        for k in 0..20 {
+            let at = DVec3::new(0.05 * f64::from(k) + 0.01, 0.37, 0.0);
+            for dir in [-DVec3::Z, DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.7, 0.2, -0.5)] {
+                let _ = terrain.intersect_counted(&Ray::new(at - dir * far, dir), &mut counts);
+            }
+        }
+        println!("{far:e} {counts:?}");
+        assert!(counts.prims < most * 60, "{far:e} {counts:?}");
+    }
 }

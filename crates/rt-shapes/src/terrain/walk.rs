@@ -2,10 +2,11 @@
 
 use super::{Heights, Terrain, first_of};
 use crate::Triangle;
+use crate::near::Near;
 use core::ops::ControlFlow;
 use rt_accel::Counts;
-use rt_geom::glam::{DVec2, DVec3};
-use rt_geom::{Ray, Real, Vector};
+use rt_geom::glam::DVec2;
+use rt_geom::{Ray, Real};
 
 /// Vertices are named by whole numbers of this many binary digits, whatever the level.
 pub(super) const DIGITS: u32 = 30;
@@ -81,10 +82,12 @@ fn middle(a: [u32; 2], b: [u32; 2]) -> [u32; 2] {
 pub(super) struct Walk<'a, R: Real, H, F> {
     terrain: &'a Terrain<H>,
     ray: &'a mut Ray<R>,
-    origin: DVec3,
-    dir: DVec3,
+    /// Its line: spans are along this.
+    near: Near,
     /// What a coordinate, relative to a vertex, may be off by.
     error: f64,
+    /// What heights may be off by: of vertices, by two roundings a level; of the ray's origin, where that was moved.
+    height_error: f64,
     counts: &'a mut Counts,
     each: F,
 }
@@ -100,21 +103,22 @@ impl<'a, R: Real, H: Heights, F: FnMut(u32, Triangle, &mut Ray<R>) -> ControlFlo
         if !ray.is_valid() {
             return ControlFlow::Continue(());
         }
-        let (origin, dir) = (ray.origin.widen(), ray.dir.widen());
         let [min, max] = terrain.bound;
-        // The rounding of vertices and of what lies between them and the origin.
-        let error = 8.0 * U * (origin.abs() + min.abs().max(max.abs())).max_element();
-        let mut span = Span { from: ray.t_min.into(), to: ray.t_max.reach() };
+        let size = min.abs().max(max.abs()).max_element();
+        let near = Near::new(&ray.widen(), (min + max) * 0.5, size);
+        let mut span = Span { from: near.before(ray.t_min.into()), to: near.after(ray.t_max.reach()) };
         for a in 0..3 {
-            span.keep(origin[a] - min[a], dir[a], error);
-            span.keep(max[a] - origin[a], -dir[a], error);
+            // The rounding of vertices and of what lies between them and the origin.
+            let error = near.error[a] + 8.0 * U * (near.origin[a].abs() + size);
+            span.keep(near.origin[a] - min[a], near.dir[a], error);
+            span.keep(max[a] - near.origin[a], -near.dir[a], error);
         }
-        // Beyond the range of products there is nothing that could be told apart.
-        let in_range = dir.abs().max_element() < 1e100 && origin.abs().max_element() < 1e100;
-        if span.is_empty() || !(span.from.is_finite() && span.to.is_finite() && in_range) {
+        if span.is_empty() || !(span.from.is_finite() && span.to.is_finite()) {
             return ControlFlow::Continue(());
         }
-        let mut walk = Walk { terrain, ray, origin, dir, error, counts, each };
+        let error = near.error.max_element() + 8.0 * U * (near.origin.abs().max_element() + size);
+        let height_error = 64.0 * f64::EPSILON * terrain.tall + near.error.z;
+        let mut walk = Walk { terrain, ray, near, error, height_error, counts, each };
         let roots = terrain.roots();
         let spans = roots.map(|node| walk.enter(&node, span));
         let order = if spans[0].from <= spans[1].from { [0, 1] } else { [1, 0] };
@@ -126,7 +130,7 @@ impl<'a, R: Real, H: Heights, F: FnMut(u32, Triangle, &mut Ray<R>) -> ControlFlo
 
     /// Opens a node that the ray is in during `span`.
     fn open(&mut self, node: &Node, mut span: Span) -> ControlFlow<()> {
-        span.to = span.to.min(self.ray.t_max.reach());
+        span.to = span.to.min(self.near.after(self.ray.t_max.reach()));
         if span.is_empty() {
             return ControlFlow::Continue(());
         }
@@ -154,7 +158,8 @@ impl<'a, R: Real, H: Heights, F: FnMut(u32, Triangle, &mut Ray<R>) -> ControlFlo
     #[inline]
     fn enter(&self, node: &Node, mut span: Span) -> Span {
         let p: [DVec2; 3] = node.at.map(|at| self.terrain.place(at));
-        let (o, d) = (self.origin.truncate(), self.dir.truncate());
+        let Near { origin, dir, .. } = self.near;
+        let (o, d) = (origin.truncate(), dir.truncate());
         let far = span.from.abs().max(span.to.abs());
         let (mut above, mut along, mut bound, mut area) = (0.0, 0.0, 0.0, 0.0);
         for k in 0..3 {
@@ -180,12 +185,12 @@ impl<'a, R: Real, H: Heights, F: FnMut(u32, Triangle, &mut Ray<R>) -> ControlFlo
             }
         };
         // Heights, too, were rounded on their way: twice a level.
-        let (at, slope) = (self.origin.z * area - above, self.dir.z * area - along);
+        let (at, slope) = (origin.z * area - above, dir.z * area - along);
         let size = area.abs();
         let slack = 2.0 * bound
-            + 4.0 * U * size * (self.origin.z.abs() + far * self.dir.z.abs())
-            + size * 64.0 * f64::EPSILON * self.terrain.tall
-            + (self.origin.z.abs() + far * self.dir.z.abs()) * 6.0 * bound_of_area(&p, self.error);
+            + 4.0 * U * size * (origin.z.abs() + far * dir.z.abs())
+            + size * self.height_error
+            + (origin.z.abs() + far * dir.z.abs()) * 6.0 * bound_of_area(&p, self.error);
         span.keep(at - reach[0] * area, slope, slack);
         span.keep(reach[1] * area - at, -slope, slack);
         span
@@ -211,10 +216,10 @@ impl Span {
         self.from > self.to
     }
 
-    /// Keeps what fulfils `at + slope t >= -slack`, and a rounding more.
+    /// Keeps what fulfils `at + slope t >= -slack`, and a rounding more; products may have underflowed.
     #[inline(always)]
     fn keep(&mut self, at: f64, slope: f64, slack: f64) {
-        let at = at + slack;
+        let at = at + (slack + f64::MIN_POSITIVE);
         let t = -at / slope;
         let t = (t, t.abs() * (4.0 * U));
         if slope > 0.0 {
