@@ -29,14 +29,13 @@ const FAR: f64 = 1e8;
 /// tolerance. Only the closest hit is reported by [`Primitive::all_hits`]: how often a line crosses such a set is not for finite
 /// arithmetic to say.
 ///
-/// Rays that [`Surface::spawn`] sends off from a hit of a ray that came from outside, to the side of the normal, begin outside of what
-/// is met, too: that is looked at
-/// when the surface is asked for, at the origins in the precision of the ray and in `f64`, and the way there from the arriving ray is
-/// proved to hold no point of the set. So they neither end where they begin nor come out behind a wall. What they meet later is
-/// as right as for any other ray; that may be soon, the set being rough at every scale. Towards the other side there is only the
-/// set, which is solid: such rays end at once. An [`Instance`](rt_accel::Instance) that turns the set makes the step up to three times as
-/// long; six such lengths are looked at, too, but that is no proof: of 30 000 hits one had its
-/// rays end where they began.
+/// Rays that [`Surface::spawn`] sends off from a hit, to the side of the normal, begin outside of what is met if the arriving ray
+/// did: that is looked at when the surface is asked for, at the origins in the precision of the ray and in `f64`, and the way there
+/// from the arriving ray is proved to hold no point of the set. So they neither end where they begin nor come out behind a wall.
+/// What they meet later is as right as for any other ray; that may be soon, the set being rough at every scale: one in sixty meets
+/// something within the tolerance. Towards the other side there is only the set, which is solid: such rays end at once. An
+/// [`Instance`](rt_accel::Instance) that turns the set makes the step up to three times as long; six such lengths are looked at,
+/// too, but that is no proof.
 ///
 /// ```
 /// use rt_accel::Primitive;
@@ -299,9 +298,9 @@ impl Julia {
         (most > self.params.tolerance && radius > 16.0 * U * p.abs().element_sum()).then_some(radius)
     }
 
-    /// The surface at `p` with this normal, outside of what is met by no more than `gap`, with an error that brings rays spawned on the side of its
-    /// normal to where they get away, on a way without a point of the set, and does so at these multiples of the error, too; `None`
-    /// if none is found.
+    /// The surface at `p` with this normal, outside of what is met by no more than `gap`, with an error that brings rays spawned on
+    /// the side of its normal to where they get away, on a way without a point of the set, and does so at these multiples of the
+    /// error, too; `None` if none is found.
     fn departure<R: Real>(&self, p: DVec3, normal: DVec3, gap: f64, multiples: &[f64]) -> Option<Surface> {
         let radius = self.leaves(p)?;
         let least = gap + p.abs().max_element() * (4.0 * U);
@@ -379,11 +378,11 @@ impl<R: Real> Primitive<R> for Julia {
 impl<R: Real> Shape<R> for Julia {
     /// A point of the ray just outside of where it meets the set; the normal is the gradient of the potential there, by the
     /// Jacobian of the orbit, turned towards the arriving ray in the few crevices where it leads straight into another wall; there
-    /// are no parameters. The error covers the way from there to what is met, not that to the
-    /// set itself, which is another [`JuliaParams::tolerance`]; and it is chosen for [`Surface::spawn`], see [`Julia`].
+    /// are no parameters. The error covers the way from there to what is met, not that to the set itself, which is another
+    /// [`JuliaParams::tolerance`]; and it is chosen for [`Surface::spawn`], see [`Julia`].
     ///
-    /// The ray is followed once more, and some twenty places are looked at: a third more work than finding the hit. For a hit that `ray` does not have, or has from its
-    /// start: the point on the ray, and an error of twice the tolerance or more.
+    /// The ray is followed once more, and some twenty places are looked at: a third more work than finding the hit. For a hit that
+    /// `ray` does not have, or has from its start: the point on the ray, and an error of twice the tolerance or more.
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
         let wide = ray.widen();
         let end = self.follow(&wide, &mut JuliaCounts::default());
