@@ -35,7 +35,7 @@ pub enum Stop {
 /// How a tree is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Storage {
-    /// As nodes of 48 bytes: planes, and links to children.
+    /// As nodes of 32 bytes: planes, and where the children are.
     Nodes,
     /// As the sorted Morton codes of the leaves that are not empty, 8 bytes each, and no nodes: rays compute the planes anew and
     /// search for the children. For [`Split::Centre`] only, since planes are not kept. Smaller, and slower.
