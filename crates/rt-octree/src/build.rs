@@ -12,8 +12,8 @@ use rt_bounds::Aabb;
 use rt_geom::glam::{DVec3, Vec3A};
 use rt_geom::{Ray, Real};
 
-/// Cells with up to this many references are built by one thread, away from the others, and larger ones looked at in pieces of so many:
-/// fixed, so that the tree does not depend on the number of threads.
+/// Cells with up to this many references are built by one thread, away from the others, and larger ones looked at in
+/// pieces of so many: fixed, so that the tree does not depend on the number of threads.
 const ALONE: usize = 1 << 13;
 
 impl Structure for Octree {
@@ -232,8 +232,8 @@ impl Splitter<'_> {
         assemble(&top, built)
     }
 
-    /// Builds what is in a cell onto a tree; its link, and what it costs a ray that meets the cell. `others` is how many bytes are in use
-    /// elsewhere. As deep as the tree.
+    /// Builds what is in a cell onto a tree; its link, and what it costs a ray that meets the cell. `others` is how
+    /// many bytes are in use elsewhere. As deep as the tree.
     fn grown(&self, task: Task, tree: &mut Tree, others: usize) -> Result<(u32, f64), BuildError> {
         let price = self.leaf_price(task.parts.len());
         if let Some(Halved { planes, children }) = self.halved(&task) {
@@ -316,8 +316,8 @@ impl Splitter<'_> {
         Some(Halved { planes, children })
     }
 
-    /// The planes that the surface area heuristic chooses: first the best along any axis, then the best along another with that one in place, then
-    /// along the third; then the first two once more, with the others in place.
+    /// The planes that the surface area heuristic chooses: first the best along any axis, then the best along another
+    /// with that one in place, then along the third; then the first two once more, with the others in place.
     fn cheapest(&self, task: &Task) -> [f32; 3] {
         let core = finite(task.parts.iter().map(|(_, part)| part));
         let mut planes = task.cell.max.to_array();

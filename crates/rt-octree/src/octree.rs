@@ -8,7 +8,8 @@ use rt_accel::{Bounded, Invalid, Mailing, Sah};
 use rt_bounds::Aabb;
 use rt_geom::glam::DVec3;
 
-/// The greatest number of splits on a way from the root to a leaf: as many as there is room for in a Morton code of 64 bits.
+/// The greatest number of splits on a way from the root to a leaf: as many as there is room for in a Morton code of 64
+/// bits.
 pub const MAX_DEPTH: usize = 21;
 
 /// Entries on the stack of a walk that opens one node after another: seven are left behind at each.
@@ -17,9 +18,9 @@ pub(crate) const STACK: usize = 7 * MAX_DEPTH + 8;
 /// Marks a link to a leaf.
 pub(crate) const LEAF: u32 = 1 << 31;
 
-/// Three planes, and where its children are, in 32 bytes, two to a line of cache; its box is implied. Child `c` lies above the plane of x where
-/// bit 0 of `c` is set, of y where bit 1, of z where bit 2. Inner children are consecutive nodes, and leaves that are not empty consecutive
-/// leaves.
+/// Three planes, and where its children are, in 32 bytes, two to a line of cache; its box is implied. Child `c` lies
+/// above the plane of x where bit 0 of `c` is set, of y where bit 1, of z where bit 2. Inner children are consecutive
+/// nodes, and leaves that are not empty consecutive leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct Node {
@@ -64,15 +65,16 @@ impl Node {
     }
 }
 
-/// An octree with planes in `f32`, for rays of both precisions. 32 bytes a node, or none; 4 (linear: 12) a leaf that is not empty, 4 a
-/// reference.
+/// An octree with planes in `f32`, for rays of both precisions. 32 bytes a node, or none; 4 (linear: 12) a leaf that is
+/// not empty, 4 a reference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Octree {
     pub(crate) origin: DVec3,
     pub(crate) bound: Aabb,
     /// A box around all finite coordinates.
     pub(crate) core: Aabb,
-    /// The root first, depth first but for siblings, which are together. None where the root is a leaf, or by [`Storage::Linear`].
+    /// The root first, depth first but for siblings, which are together. None where the root is a leaf, or by
+    /// [`Storage::Linear`].
     pub(crate) nodes: Vec<Node>,
     /// The Morton code of each leaf, ascending; only by [`Storage::Linear`].
     pub(crate) keys: Vec<u64>,
@@ -110,8 +112,8 @@ pub struct Statistics {
     pub depth: usize,
     /// Splits on the way to a leaf with primitives, on average.
     pub mean_depth: f64,
-    /// Nodes, leaves with primitives, and tests that a line through the bound meets on average, uniform and stopped by nothing:
-    /// sums of surface areas over the bound's.
+    /// Nodes, leaves with primitives, and tests that a line through the bound meets on average, uniform and stopped by
+    /// nothing: sums of surface areas over the bound's.
     ///
     /// Source: MacDonald and Booth, "Heuristics for ray tracing using space subdivision", The Visual Computer 6 (1990).
     pub expected: [f64; 3],
@@ -134,6 +136,7 @@ pub(crate) struct Run {
 }
 
 /// What a node is.
+#[expect(clippy::large_enum_variant, reason = "it lives for a moment, on the stack")]
 pub(crate) enum View {
     Leaf(u32),
     Split { planes: [f32; 3], children: [Option<Place>; 8] },
@@ -146,8 +149,8 @@ impl Octree {
         &self.nodes
     }
 
-    /// The Morton codes of the leaves that are not empty, ascending, by [`Storage::Linear`]: the numbers of the children on the way to
-    /// the leaf, three bits each from the highest on, and a 1 behind them.
+    /// The Morton codes of the leaves that are not empty, ascending, by [`Storage::Linear`]: the numbers of the
+    /// children on the way to the leaf, three bits each from the highest on, and a 1 behind them.
     pub fn keys(&self) -> &[u64] {
         &self.keys
     }
@@ -228,14 +231,15 @@ impl Octree {
         s
     }
 
-    /// The expected cost of a line through the bound by the surface area heuristic, in the unit of the build's [`Sah`]: for nodes and leaves
-    /// visited, and tests. `O(n)`.
+    /// The expected cost of a line through the bound by the surface area heuristic, in the unit of the build's [`Sah`]:
+    /// for nodes and leaves visited, and tests. `O(n)`.
     pub fn sah_cost(&self) -> f64 {
         let [splits, leaves, tests] = self.statistics().expected;
         self.sah.traverse as f64 * (splits + leaves) + self.sah.intersect as f64 * tests
     }
 
-    /// Calls `see` for every node and every leaf that is not empty, with its cell and the number of splits above, depth first.
+    /// Calls `see` for every node and every leaf that is not empty, with its cell and the number of splits above, depth
+    /// first.
     pub(crate) fn each(&self, see: &mut dyn FnMut(&View, &Aabb, usize)) {
         let mut stack: Vec<(Place, Aabb, usize)> =
             self.root().map(|root| (root, self.bound, 0)).into_iter().collect();

@@ -10,7 +10,8 @@ use rt_bounds::{Aabb, SlabRay};
 use rt_geom::glam::Vec4;
 use rt_geom::{Axis, Ray, Real};
 
-/// Which bits are set in a number whose bits were numbered by how they are met: `MIRRORED[m][full]` has bit `c` where `full` has `c ^ m`.
+/// Which bits are set in a number whose bits were numbered by how they are met: `MIRRORED[m][full]` has bit `c` where
+/// `full` has `c ^ m`.
 const MIRRORED: [[u8; 256]; 8] = {
     let mut table = [[0u8; 256]; 8];
     let mut m = 0;
