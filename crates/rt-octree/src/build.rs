@@ -12,8 +12,8 @@ use rt_bounds::Aabb;
 use rt_geom::glam::{DVec3, Vec3A};
 use rt_geom::{Ray, Real};
 
-/// Cells with up to this many references are built by one thread, away from the others, and larger ones looked at in pieces of so many:
-/// fixed, so that the tree does not depend on the number of threads.
+/// Cells with up to this many references are built by one thread, away from the others, and larger ones looked at in
+/// pieces of so many: fixed, so that the tree does not depend on the number of threads.
 const ALONE: usize = 1 << 13;
 
 impl Structure for Octree {
@@ -48,12 +48,16 @@ impl Structure for Octree {
             let tree = splitter.tree(parts, world, watch)?;
             octree.repeats = tree.prims.len() > held;
             octree.mailing = if octree.repeats { params.mailing } else { Mailing::None };
-            octree.starts = tree.starts;
-            octree.starts.push(tree.prims.len() as u32);
-            octree.prims = tree.prims;
             match params.storage {
-                Storage::Nodes => octree.nodes = tree.nodes,
-                Storage::Linear => octree.keys = keys(&tree.nodes, octree.starts.len() - 1),
+                Storage::Nodes => {
+                    // Once more as large, or nearly.
+                    splitter.within_limit(2 * tree.bytes())?;
+                    (octree.nodes, octree.starts, octree.prims) = packed(&tree);
+                }
+                Storage::Linear => {
+                    octree.keys = keys(&tree.nodes, tree.starts.len() - 1);
+                    (octree.starts, octree.prims) = (tree.starts, tree.prims);
+                }
             }
         }
         if watch(1.0).is_break() {
@@ -102,17 +106,27 @@ impl Structure for Octree {
     }
 }
 
-/// A finished part of a tree; its nodes, leaves and references numbered from 0.
+/// Three planes and eight links, while they are made.
+#[derive(Clone, Copy)]
+pub(crate) struct Draft {
+    pub(crate) planes: [f32; 3],
+    /// Bit `c` is set where child `c` is not empty.
+    pub(crate) full: u8,
+    /// Nodes, or leaves with [`LEAF`]; 0 for an empty child.
+    pub(crate) links: [u32; 8],
+}
+
+/// A finished part of a tree; its nodes, leaves and references numbered from 0, depth first.
 #[derive(Default)]
 struct Tree {
-    nodes: Vec<Node>,
+    nodes: Vec<Draft>,
     starts: Vec<u32>,
     prims: Vec<u32>,
 }
 
 impl Tree {
     fn bytes(&self) -> usize {
-        self.nodes.len() * size_of::<Node>() + (self.starts.len() + self.prims.len()) * size_of::<u32>()
+        self.nodes.len() * size_of::<Draft>() + (self.starts.len() + self.prims.len()) * size_of::<u32>()
     }
 }
 
@@ -218,13 +232,13 @@ impl Splitter<'_> {
         assemble(&top, built)
     }
 
-    /// Builds what is in a cell onto a tree; its link, and what it costs a ray that meets the cell. `others` is how many bytes are in use
-    /// elsewhere. As deep as the tree.
+    /// Builds what is in a cell onto a tree; its link, and what it costs a ray that meets the cell. `others` is how
+    /// many bytes are in use elsewhere. As deep as the tree.
     fn grown(&self, task: Task, tree: &mut Tree, others: usize) -> Result<(u32, f64), BuildError> {
         let price = self.leaf_price(task.parts.len());
         if let Some(Halved { planes, children }) = self.halved(&task) {
             let (here, leaves, refs) = (tree.nodes.len(), tree.starts.len(), tree.prims.len());
-            tree.nodes.push(Node { planes, full: 0, links: [0; 8] });
+            tree.nodes.push(Draft { planes, full: 0, links: [0; 8] });
             let others = others + task.parts.len() * size_of::<Part>();
             self.within_limit(others + tree.bytes())?;
             let mut cost = self.params.sah.traverse as f64;
@@ -302,8 +316,8 @@ impl Splitter<'_> {
         Some(Halved { planes, children })
     }
 
-    /// The planes that the surface area heuristic chooses: first the best along any axis, then the best along another with that one in place, then
-    /// along the third; then the first two once more, with the others in place.
+    /// The planes that the surface area heuristic chooses: first the best along any axis, then the best along another
+    /// with that one in place, then along the third; then the first two once more, with the others in place.
     fn cheapest(&self, task: &Task) -> [f32; 3] {
         let core = finite(task.parts.iter().map(|(_, part)| part));
         let mut planes = task.cell.max.to_array();
@@ -437,7 +451,7 @@ fn assemble(top: &[Top], parts: Vec<(Tree, u32)>) -> Result<Tree, BuildError> {
         let nodes = tree.nodes.len() as u32;
         let link = match &top[at] {
             Top::Split { planes, children } => {
-                tree.nodes.push(Node { planes: *planes, full: 0, links: [0; 8] });
+                tree.nodes.push(Draft { planes: *planes, full: 0, links: [0; 8] });
                 for (c, child) in children.iter().enumerate().rev() {
                     stack.extend(child.map(|child| (child, Some((nodes as usize, c)))));
                 }
@@ -452,7 +466,7 @@ fn assemble(top: &[Top], parts: Vec<(Tree, u32)>) -> Result<Tree, BuildError> {
                         1 => moved(node.links[c]),
                         _ => 0,
                     });
-                    Node { links, ..*node }
+                    Draft { links, ..*node }
                 }));
                 tree.starts.extend(part.starts.iter().map(|start| start + refs));
                 tree.prims.extend(part.prims);
@@ -464,8 +478,48 @@ fn assemble(top: &[Top], parts: Vec<(Tree, u32)>) -> Result<Tree, BuildError> {
             tree.nodes[parent].links[c] = link;
         }
     }
-    tree.nodes.shrink_to_fit();
+    tree.starts.push(tree.prims.len() as u32);
     Ok(tree)
+}
+
+/// Nodes with siblings together, where the leaves of each begin and their references, in the order of the nodes.
+fn packed(tree: &Tree) -> (Vec<Node>, Vec<u32>, Vec<u32>) {
+    let mut nodes = Vec::with_capacity(tree.nodes.len());
+    let mut starts = Vec::with_capacity(tree.starts.len());
+    let mut prims = Vec::with_capacity(tree.prims.len());
+    let mut leaf = |number: usize, starts: &mut Vec<u32>| {
+        starts.push(prims.len() as u32);
+        prims.extend_from_slice(&tree.prims[tree.starts[number] as usize..tree.starts[number + 1] as usize]);
+    };
+    if tree.nodes.is_empty() {
+        leaf(0, &mut starts);
+    } else {
+        nodes.push(Node::new([0.0; 3], 0, 0, 0, 0));
+    }
+    // Drafts, and where they go.
+    let mut stack: Vec<(u32, usize)> = nodes.iter().map(|_| (0, 0)).collect();
+    while let Some((at, to)) = stack.pop() {
+        let Draft { planes, full, links } = tree.nodes[at as usize];
+        let (first, leaves) = (nodes.len(), starts.len() as u32);
+        let mut inner = 0u8;
+        for (c, link) in links.into_iter().enumerate().filter(|(c, _)| full >> c & 1 == 1) {
+            if link & LEAF != 0 {
+                leaf((link & !LEAF) as usize, &mut starts);
+            } else {
+                inner |= 1 << c;
+                nodes.push(Node::new([0.0; 3], 0, 0, 0, 0));
+            }
+        }
+        nodes[to] = Node::new(planes, first as u32, leaves, full, inner);
+        for (i, c) in (0..8).filter(|c| inner >> c & 1 == 1).enumerate() {
+            stack.push((links[c], first + i));
+        }
+        // The first child's part comes next.
+        let pushed = stack.len() - inner.count_ones() as usize;
+        stack[pushed..].reverse();
+    }
+    starts.push(prims.len() as u32);
+    (nodes, starts, prims)
 }
 
 /// Does some work for each item, on all cores where that is enabled; results in order.

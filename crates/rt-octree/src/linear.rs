@@ -1,6 +1,7 @@
 //! Morton codes instead of nodes: a node is the run of those leaves whose codes begin with its own.
 
-use crate::octree::{LEAF, Node, Run};
+use crate::build::Draft;
+use crate::octree::{LEAF, Run};
 
 /// The code of the root, were it a leaf.
 pub(crate) const ROOT: u64 = 1 << 63;
@@ -18,7 +19,7 @@ fn shift(level: u32) -> u32 {
 }
 
 /// The codes of all leaves of a tree of nodes, in their order; leaves are numbered in it.
-pub(crate) fn keys(nodes: &[Node], leaves: usize) -> Vec<u64> {
+pub(crate) fn keys(nodes: &[Draft], leaves: usize) -> Vec<u64> {
     let mut keys = vec![ROOT; leaves];
     let mut stack = vec![(0u32, 0u64, 0u32)];
     while let Some((link, prefix, level)) = stack.pop() {

@@ -21,8 +21,8 @@ pub(crate) fn child(cell: &Aabb, planes: [f32; 3], number: usize) -> Aabb {
     part
 }
 
-/// The planes in the middle of a cell, `core` being a box around all finite coordinates. Along an axis where there is no middle
-/// the plane lies on the upper face: everything is below.
+/// The planes in the middle of a cell, `core` being a box around all finite coordinates. Along an axis where there is
+/// no middle the plane lies on the upper face: everything is below.
 #[inline(always)]
 pub(crate) fn middle(cell: &Aabb, core: &Aabb) -> [f32; 3] {
     let middle = cell.min * 0.5 + cell.max * 0.5;
@@ -66,8 +66,8 @@ pub(crate) fn share(part: &Aabb, cell: &Aabb) -> f64 {
 /// How finely positions are looked at along an axis, at most.
 const BINS: usize = 32;
 
-/// What begins and ends in one thirty-second of the extent of some parts along an axis, in each of the four regions into which planes across the
-/// other axes part the cell.
+/// What begins and ends in one thirty-second of the extent of some parts along an axis, in each of the four regions
+/// into which planes across the other axes part the cell.
 #[derive(Clone, Copy, Debug)]
 struct Bin {
     begin: [u32; 4],
@@ -95,8 +95,8 @@ pub(crate) struct Bins {
 }
 
 impl Bins {
-    /// Nothing counted yet of about `parts` parts, along an axis of a cell in which they have their finite coordinates in `core`, with planes
-    /// across the other axes.
+    /// Nothing counted yet of about `parts` parts, along an axis of a cell in which they have their finite coordinates
+    /// in `core`, with planes across the other axes.
     pub(crate) fn new(axis: usize, parts: usize, core: &Aabb, planes: [f32; 3]) -> Bins {
         let size = core.max[axis] - core.min[axis];
         // A few for each of a few parts.
@@ -158,7 +158,8 @@ impl Bins {
         }
     }
 
-    /// The plane along the axis at which passing what was counted costs least, and that cost; the upper face where none pays.
+    /// The plane along the axis at which passing what was counted costs least, and that cost; the upper face where none
+    /// pays.
     pub(crate) fn cheapest(&self, cell: &Aabb, params: &OctreeParams) -> (f32, f64) {
         let (visit, test) = (params.sah.traverse as f64, params.sah.intersect as f64);
         let (low, high) = (cell.min[self.axis], cell.max[self.axis]);

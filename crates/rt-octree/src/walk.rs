@@ -10,7 +10,8 @@ use rt_bounds::{Aabb, SlabRay};
 use rt_geom::glam::Vec4;
 use rt_geom::{Axis, Ray, Real};
 
-/// Which bits are set in a number whose bits were numbered by how they are met: `MIRRORED[m][full]` has bit `c` where `full` has `c ^ m`.
+/// Which bits are set in a number whose bits were numbered by how they are met: `MIRRORED[m][full]` has bit `c` where
+/// `full` has `c ^ m`.
 const MIRRORED: [[u8; 256]; 8] = {
     let mut table = [[0u8; 256]; 8];
     let mut m = 0;
@@ -91,7 +92,7 @@ impl Octree {
                 visit.node();
                 let node = &self.nodes[at as usize];
                 let spans = Spans::new(slab, node.planes, enter, leave);
-                let mut met = spans.met & mirrored[(node.full & 255) as usize] as u32;
+                let mut met = spans.met & mirrored[node.full as usize] as u32;
                 if met != 0 {
                     // The nearest is gone to, the others are left behind, the farthest first.
                     let nearest = met.trailing_zeros() as usize;
@@ -99,10 +100,10 @@ impl Octree {
                     while met != 0 {
                         let c = 31 - met.leading_zeros() as usize;
                         let (enter, leave) = spans.of(c);
-                        let _ = stack.try_push((node.links[(c ^ mirror) & 7], enter, leave));
+                        let _ = stack.try_push((node.link(c ^ mirror), enter, leave));
                         met ^= 1 << c;
                     }
-                    at = node.links[(nearest ^ mirror) & 7];
+                    at = node.link(nearest ^ mirror);
                     (enter, leave) = spans.of(nearest);
                     continue;
                 }

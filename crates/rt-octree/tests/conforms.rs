@@ -24,7 +24,8 @@ fn params() -> [OctreeParams; 4] {
     [OctreeParams::default(), classic, OctreeParams { max_depth: Some(7), ..linear }, deep]
 }
 
-/// Where hundreds of primitives coincide the truth alone, by exact arithmetic, takes seconds: closest hits of few rays, unless all is asked.
+/// Where hundreds of primitives coincide the truth alone, by exact arithmetic, takes seconds: closest hits of few rays,
+/// unless all is asked.
 const SLOW: [&str; 5] = [
     "300 times one triangle",
     "150 pairs, back to back",

@@ -41,7 +41,8 @@ fn passed<R: Real>(tree: &Octree, ray: &Ray<R>) -> Passed {
     passed
 }
 
-/// A uniform line meets a convex cell with the chance of its share of the surface: checks traversal, cells and statistics at once.
+/// A uniform line meets a convex cell with the chance of its share of the surface: checks traversal, cells and
+/// statistics at once.
 #[test]
 fn lines_visit_as_many_nodes_as_their_surfaces_say() {
     let mesh = soup::clusters(3000, 5);
@@ -107,7 +108,8 @@ fn within(o: [i64; 3], d: [i64; 3], b: &Aabb) -> Option<[i128; 2]> {
     (span[0] <= span[1]).then_some(span)
 }
 
-/// The order of Revelles is that of the leaves' entries, by exact arithmetic; no leaf is missed, and few are visited in vain.
+/// The order of Revelles is that of the leaves' entries, by exact arithmetic; no leaf is missed, and few are visited in
+/// vain.
 fn in_order<R: Real>(params: &OctreeParams, seed: u64) {
     let mut random = Seeded::new(seed);
     let mut points: Vec<[i64; 3]> = vec![[0; 3], [1024; 3]];
@@ -185,7 +187,6 @@ fn both_storages_visit_the_same_leaves() {
         let params = OctreeParams { stop, split: Split::Centre, ..OctreeParams::default() };
         let nodes = Octree::build(&mesh, &params).unwrap();
         let keys = Octree::build(&mesh, &OctreeParams { storage: Storage::Linear, ..params }).unwrap();
-        assert_eq!(nodes.references(), keys.references());
         assert_eq!(nodes.statistics(), keys.statistics());
         assert!(
             keys.nodes().is_empty() && keys.bytes() < nodes.bytes(),
@@ -195,8 +196,9 @@ fn both_storages_visit_the_same_leaves() {
         );
         for ray in rays::uniform::<f32>(4, &nodes.local_bound(), 2000) {
             let (one, other) = (passed(&nodes, &ray), passed(&keys, &ray));
-            assert_eq!(one.leaves, other.leaves, "{ray:?}");
-            assert!(other.nodes >= one.nodes);
+            let prims = |passed: &Passed| passed.leaves.iter().map(|leaf| leaf.1.clone()).collect::<Vec<_>>();
+            assert_eq!(prims(&one), prims(&other), "{ray:?}");
+            assert_eq!(other.nodes, one.nodes);
         }
     }
 }
@@ -266,7 +268,10 @@ fn hostile(n: u32) {
         for mesh in [&one_place, &flat, &slivers] {
             let tree = Octree::build(mesh, &params).unwrap_or_else(|why| panic!("{params:?}: {why}"));
             let s = tree.statistics();
-            assert!(s.references <= 16 * s.prims && s.depth <= MAX_DEPTH, "{s:?}");
+            assert!(
+                s.references as f32 <= params.most_references * s.prims as f32 && s.depth <= MAX_DEPTH,
+                "{s:?}"
+            );
             assert_eq!(s.occupancy.iter().sum::<usize>(), s.leaves + s.empty_leaves);
             tree.validate(mesh).unwrap();
         }
