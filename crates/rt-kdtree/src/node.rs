@@ -75,11 +75,9 @@ impl Node {
 
     #[inline(always)]
     pub(crate) fn axis(self) -> Axis {
-        match self.link & 3 {
-            0 => Axis::X,
-            1 => Axis::Y,
-            _ => Axis::Z,
-        }
+        // A look-up, since a branch on the axis would be guessed wrong too often.
+        const AXES: [Axis; 4] = [Axis::X, Axis::Y, Axis::Z, Axis::Z];
+        AXES[(self.link & 3) as usize]
     }
 
     /// What this node says as node `index`.
