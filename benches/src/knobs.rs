@@ -106,10 +106,10 @@ pub(crate) fn ask(options: &Options, watch: Watch<'_>) -> Result<Vec<Group>, Tro
 }
 
 /// All values of a family on one scene: builds race builds, then trees race trees.
-fn sweep<S, G>(
+fn sweep<'a, S, G>(
     family: &Family<S>,
     subject: &Subject,
-    geometry: &G,
+    geometry: &'a G,
     sets: &[RaySet],
     effort: Effort,
     tell: &mut dyn FnMut(usize) -> Result<(), Trouble>,
@@ -119,11 +119,11 @@ where
     G: Geometry<f32> + Bounded + Clone,
     G::At: Named,
 {
-    let mut builders: Vec<Box<dyn FnMut() -> Result<Aggregate<S, &G>, BuildError> + '_>> = Vec::new();
+    let mut builders: Vec<Box<dyn FnMut() -> Result<Aggregate<S, &'a G>, BuildError> + '_>> = Vec::new();
     for (_, params) in &family.values {
         builders.push(Box::new(move || Aggregate::build(geometry, params)));
     }
-    let mut turns: Vec<&mut dyn FnMut() -> Result<Aggregate<S, &G>, BuildError>> = Vec::new();
+    let mut turns: Vec<&mut dyn FnMut() -> Result<Aggregate<S, &'a G>, BuildError>> = Vec::new();
     for builder in &mut builders {
         turns.push(&mut **builder);
     }
