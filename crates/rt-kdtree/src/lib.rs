@@ -39,8 +39,8 @@
 //! # Where the time goes
 //!
 //! Loading nodes is what a walk waits for: on a scan of 69 000 triangles more than half of the samples of a profile fall there. So
-//! nodes are 8 bytes, and empty children, more than half of all leaves, are no nodes at all. Against a tree that stores them this
-//! saves a fifth to a third of the bytes; and together with a walk that does not branch upon the axis of a node, nor upon the order
+//! nodes are 8 bytes, and empty children, which are 14 to 70 % of all leaves in nine scenes, are no nodes at all. Against a tree that
+//! stores them this saves a fifth to a third of the bytes on four of these; and together with a walk that does not branch upon the axis of a node, nor upon the order
 //! of its children, it makes rays 1.02 to 1.26 times as fast (seven scenes, primary rays, chords and diffuse rays; 1.13 in the
 //! geometric mean).
 //!

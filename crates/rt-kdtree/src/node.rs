@@ -13,7 +13,7 @@ pub const MAX_DEPTH: usize = 60;
 ///
 /// The child below a split is the next node, the child above is named. A child without primitives is not stored: node 0, the root,
 /// is nobody's child, so a split that names it has nothing above; and one that names the next node as the child above has nothing
-/// below. More than half of all leaves are empty.
+/// below. Often more than half of all leaves are empty.
 ///
 /// Source: Wald, *Realtime Ray Tracing and Interactive Global Illumination*, PhD thesis, Saarland University (2004), section 7.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
