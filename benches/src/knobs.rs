@@ -119,13 +119,11 @@ where
     G: Geometry<f32> + Bounded + Clone,
     G::At: Named,
 {
-    let mut builders: Vec<Box<dyn FnMut() -> Result<Aggregate<S, &'a G>, BuildError> + '_>> = Vec::new();
-    for (_, params) in &family.values {
-        builders.push(Box::new(move || Aggregate::build(geometry, params)));
-    }
+    let build = |params| move || Aggregate::build(geometry, params);
+    let mut builders: Vec<_> = family.values.iter().map(|(_, params)| build(params)).collect();
     let mut turns: Vec<&mut dyn FnMut() -> Result<Aggregate<S, &'a G>, BuildError>> = Vec::new();
     for builder in &mut builders {
-        turns.push(&mut **builder);
+        turns.push(builder);
     }
     let mut scenes = Vec::new();
     for ((name, _), (scene, ms)) in family.values.iter().zip(build_all(family.builds, &mut turns)) {

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`Question::Closest`] | what does a closest hit cost, by scene, kind of rays, precision, exact or fast? |
 //! | [`Question::Any`] | the same of any hit, for short rays and for rays to a light |
-//! | [`Question::Build`] | what does each knob of [`BvhParams`](rt_bvh::BvhParams) and [`KdTreeParams`](rt_kdtree::KdTreeParams) buy, in build time and in time a ray? |
+//! | [`Question::Build`] | what does each knob of a BVH's and of a kd-tree's build buy, in build time and in time a ray? |
 //! | [`Question::Precision`] | what does the fast triangle test gain, and what does it get wrong? |
 //! | [`Question::Structures`] | which structure for which scene? |
 //! | [`Question::Subdivision`] | how finely should a grid divide space? |
