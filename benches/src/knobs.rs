@@ -2,16 +2,29 @@
 //!
 //! Values that lead to the same tree, as large leaves do wherever the surface area heuristic prefers small ones, are timed
 //! all the same: what they differ by is noise, and no difference below it means anything.
+//!
+//! Two families are asked, the BVH and the kd-tree, each against its own default.
 
 use crate::contest::{Contestant, Group, Label, Named, Weigh, build_all, contest, ours};
 use crate::judge::Judge;
 use crate::subject::{Prims, RayKind, RaySet, Subject};
 use crate::{Effort, Options, Trouble, Watch, hear};
-use rt_accel::{Aggregate, Bounded, BuildError, Geometry, Sah, Structure};
+use rt_accel::{Aggregate, Bounded, BuildError, Clip, Geometry, Mailing, Sah, Structure};
 use rt_bvh::{Builder, Bvh, BvhParams};
+use rt_kdtree::{KdTree, KdTreeParams};
+use rt_measure::clock::Plan;
 
-/// One value of one knob, the others at their defaults.
-fn values() -> Vec<(String, BvhParams)> {
+/// A structure and what to try with it, the default first.
+struct Family<S: Structure> {
+    name: &'static str,
+    values: Vec<(String, S::Params)>,
+    /// The cost that the surface area heuristic expects, in the unit of the build: between prices it compares nothing.
+    sah: fn(&S) -> f64,
+    builds: Plan,
+}
+
+/// The BVH, one value of one knob at a time, the others at their defaults.
+fn bvh(effort: Effort) -> Family<Bvh> {
     let base = BvhParams::default();
     let mut values = vec![("default".to_string(), base)];
     for bins in [8, 16, 32, 64] {
@@ -29,7 +42,31 @@ fn values() -> Vec<(String, BvhParams)> {
     }
     // What equals the default is measured once, as that.
     values.retain(|(name, params)| name == "default" || *params != base);
-    values
+    Family { name: "bvh", values, sah: |tree| tree.sah_cost() as f64, builds: effort.builds() }
+}
+
+/// The kd-tree, likewise. Its builds take so much longer that a quick answer times each once.
+fn kdtree(effort: Effort) -> Family<KdTree> {
+    let base = KdTreeParams::default();
+    let mut values = vec![("default".to_string(), base)];
+    for intersect in [0.5, 0.75, 1.0, 1.5, 2.0, 3.0] {
+        let sah = Sah { intersect, ..base.sah };
+        values.push((format!("intersect={intersect}"), KdTreeParams { sah, ..base }));
+    }
+    for empty_bonus in [0.0, 0.1, 0.2, 0.35, 0.5] {
+        values.push((format!("empty_bonus={empty_bonus}"), KdTreeParams { empty_bonus, ..base }));
+    }
+    for bad_splits in [0, 1, 2] {
+        values.push((format!("bad_splits={bad_splits}"), KdTreeParams { bad_splits, ..base }));
+    }
+    for depth in [16, 20, 24, 40] {
+        values.push((format!("max_depth={depth}"), KdTreeParams { max_depth: Some(depth), ..base }));
+    }
+    values.push(("clip=box".into(), KdTreeParams { clip: Clip::Box, ..base }));
+    values.push(("mailing=hashed".into(), KdTreeParams { mailing: Mailing::Hashed, ..base }));
+    values.retain(|(name, params)| name == "default" || *params != base);
+    let builds = if effort == Effort::Quick { Plan { warm_up: 0, rounds: 1 } } else { effort.builds() };
+    Family { name: "kdtree", values, sah: KdTree::sah_cost, builds }
 }
 
 pub(crate) fn ask(options: &Options, watch: Watch<'_>) -> Result<Vec<Group>, Trouble> {
@@ -47,45 +84,50 @@ pub(crate) fn ask(options: &Options, watch: Watch<'_>) -> Result<Vec<Group>, Tro
             &made
         }
     };
+    let (bvh, kdtree) = (bvh(options.effort), kdtree(options.effort));
+    let steps = subjects.len() * 8;
     let mut groups = Vec::new();
     for (i, subject) in subjects.iter().enumerate() {
-        hear(watch, i * 4, subjects.len() * 4)?;
+        hear(watch, i * 8, steps)?;
         let sets = subject.rays(&kinds, options.effort.rays())?;
-        let mut tell = |done: usize| hear(watch, i * 4 + 1 + done, subjects.len() * 4);
+        let mut tell = |done: usize| hear(watch, i * 8 + 1 + done, steps);
         groups.extend(match &subject.prims {
-            Prims::Mesh(mesh) => sweep(subject, mesh, &sets, options.effort, &mut tell)?,
-            Prims::Solids(solids) => sweep(subject, solids, &sets, options.effort, &mut tell)?,
+            Prims::Mesh(mesh) => sweep(&bvh, subject, mesh, &sets, options.effort, &mut tell)?,
+            Prims::Solids(solids) => sweep(&bvh, subject, solids, &sets, options.effort, &mut tell)?,
+        });
+        let mut tell = |done: usize| hear(watch, i * 8 + 4 + done, steps);
+        groups.extend(match &subject.prims {
+            Prims::Mesh(mesh) => sweep(&kdtree, subject, mesh, &sets, options.effort, &mut tell)?,
+            Prims::Solids(solids) => sweep(&kdtree, subject, solids, &sets, options.effort, &mut tell)?,
         });
     }
     hear(watch, 1, 1)?;
     Ok(groups)
 }
 
-/// All values on one scene: builds race builds, then trees race trees.
-fn sweep<G>(
+/// All values of a family on one scene: builds race builds, then trees race trees.
+fn sweep<'a, S, G>(
+    family: &Family<S>,
     subject: &Subject,
-    geometry: &G,
+    geometry: &'a G,
     sets: &[RaySet],
     effort: Effort,
     tell: &mut dyn FnMut(usize) -> Result<(), Trouble>,
 ) -> Result<Vec<Group>, Trouble>
 where
+    S: Structure,
     G: Geometry<f32> + Bounded + Clone,
     G::At: Named,
 {
-    let values = values();
-    let mut builders: Vec<Box<dyn FnMut() -> Result<(), BuildError> + '_>> = Vec::new();
-    for (_, params) in &values {
-        builders.push(Box::new(move || Bvh::build(geometry, params).map(drop)));
-    }
-    let mut turns: Vec<&mut dyn FnMut() -> Result<(), BuildError>> = Vec::new();
+    let build = |params| move || Aggregate::build(geometry, params);
+    let mut builders: Vec<_> = family.values.iter().map(|(_, params)| build(params)).collect();
+    let mut turns: Vec<&mut dyn FnMut() -> Result<Aggregate<S, &'a G>, BuildError>> = Vec::new();
     for builder in &mut builders {
-        turns.push(&mut **builder);
+        turns.push(builder);
     }
     let mut scenes = Vec::new();
-    for ((name, params), (built, ms)) in values.iter().zip(build_all(effort.builds(), &mut turns)) {
-        built?;
-        scenes.push((name, Aggregate::<Bvh, _>::build(geometry, params)?, ms));
+    for ((name, _), (scene, ms)) in family.values.iter().zip(build_all(family.builds, &mut turns)) {
+        scenes.push((name, scene?, ms));
     }
     tell(0)?;
     let judge = Judge::new(&subject.prims);
@@ -96,11 +138,10 @@ where
         let mut contestants: Vec<Contestant<'_>> = Vec::new();
         for (name, scene, ms) in &scenes {
             let label = Label {
-                structure: "bvh",
+                structure: family.name,
                 params: name.to_string(),
                 build_ms: *ms,
-                // In the unit of the build: between values of `traverse` it compares nothing.
-                sah: Some(scene.structure().sah_cost() as f64),
+                sah: Some((family.sah)(scene.structure())),
                 exact: true,
             };
             contestants.push(ours::<f32, _, _>(scene, set, label));

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | [`Question::Closest`] | what does a closest hit cost, by scene, kind of rays, precision, exact or fast? |
 //! | [`Question::Any`] | the same of any hit, for short rays and for rays to a light |
-//! | [`Question::Build`] | what does each knob of [`BvhParams`](rt_bvh::BvhParams) buy, in build time and in time a ray? |
+//! | [`Question::Build`] | what does each knob of a BVH's and of a kd-tree's build buy, in build time and in time a ray? |
 //! | [`Question::Precision`] | what does the fast triangle test gain, and what does it get wrong? |
 //! | [`Question::Structures`] | which structure for which scene? |
 //! | [`Question::Subdivision`] | how finely should a grid divide space? |
@@ -161,7 +161,7 @@ impl Question {
         let seconds = match (self, effort) {
             (Question::Closest, Effort::Quick) => 20,
             (Question::Any, Effort::Quick) => 14,
-            (Question::Build, Effort::Quick) => 30,
+            (Question::Build, Effort::Quick) => 120,
             (Question::Precision, Effort::Quick) => 12,
             (Question::Structures, Effort::Quick) => 60,
             (Question::Subdivision, Effort::Quick) => 30,
@@ -173,7 +173,7 @@ impl Question {
             (Question::Rivals, Effort::Quick) => 25,
             (Question::Closest, Effort::Normal) => 90,
             (Question::Any, Effort::Normal) => 60,
-            (Question::Build, Effort::Normal) => 170,
+            (Question::Build, Effort::Normal) => 600,
             (Question::Precision, Effort::Normal) => 40,
             (Question::Structures, Effort::Normal) => 300,
             (Question::Subdivision, Effort::Normal) => 120,
@@ -184,7 +184,7 @@ impl Question {
             (Question::Rivals, Effort::Normal) => 200,
             (Question::Closest, Effort::Full) => 360,
             (Question::Any, Effort::Full) => 240,
-            (Question::Build, Effort::Full) => 600,
+            (Question::Build, Effort::Full) => 3000,
             (Question::Precision, Effort::Full) => 90,
             (Question::Structures, Effort::Full) => 600,
             (Question::Subdivision, Effort::Full) => 300,

@@ -175,7 +175,7 @@ struct Task {
 
 /// The top of a tree while parts are built apart.
 enum Top {
-    Split { axis: Axis, position: f32, children: [usize; 2] },
+    Split { axis: Axis, position: f32, children: [Option<usize>; 2] },
     Part(usize),
 }
 
@@ -214,7 +214,7 @@ impl Splitter<'_> {
             if let Some((parent, side)) = hangs {
                 let here = top.len();
                 if let Some(Top::Split { children, .. }) = top.get_mut(parent) {
-                    children[side] = here;
+                    children[side] = Some(here);
                 }
             }
             if task.count <= ALONE {
@@ -233,10 +233,11 @@ impl Splitter<'_> {
                 }
                 Some(plane) => {
                     let here = top.len();
-                    top.push(Top::Split { axis: plane.axis, position: plane.position, children: [0; 2] });
+                    top.push(Top::Split { axis: plane.axis, position: plane.position, children: [None; 2] });
                     let [below, above] = self.split(task, &plane, &mut sides);
-                    tasks.push((above, Some((here, 1))));
-                    tasks.push((below, Some((here, 0))));
+                    let stored = stored(&below, &above);
+                    tasks.extend(stored[1].then_some((above, Some((here, 1)))));
+                    tasks.extend(stored[0].then_some((below, Some((here, 0)))));
                 }
             }
             self.within_limit(tasks.iter().map(|(task, _)| task).chain(&parts), 0)?;
@@ -293,8 +294,9 @@ impl Splitter<'_> {
                     tree.nodes.push(Node::split(plane.axis, plane.position, 0));
                     let [below, mut above] = self.split(task, &plane, &mut sides);
                     above.above_of = Some(here);
-                    tasks.push(above);
-                    tasks.push(below);
+                    let stored = stored(&below, &above);
+                    tasks.extend(stored[1].then_some(above));
+                    tasks.extend(stored[0].then_some(below));
                 }
             }
             if tree.nodes.len() % 4096 == 0 {
@@ -404,6 +406,11 @@ impl Splitter<'_> {
     }
 }
 
+/// Which of two children are stored: those with primitives, at least one.
+fn stored(below: &Task, above: &Task) -> [bool; 2] {
+    [below.count > 0 || above.count == 0, above.count > 0]
+}
+
 /// Two sorted runs as one.
 fn merged(kept: impl Iterator<Item = Event>, new: &[Event], expected: usize) -> Vec<Event> {
     let mut out = Vec::with_capacity(expected + new.len());
@@ -432,8 +439,8 @@ fn assemble(top: &[Top], parts: Vec<Tree>, nodes: usize, refs: usize) -> Tree {
         match &top[at] {
             Top::Split { axis, position, children } => {
                 tree.nodes.push(Node::split(*axis, *position, 0));
-                stack.push((children[1], Some(here)));
-                stack.push((children[0], None));
+                stack.extend(children[1].map(|above| (above, Some(here))));
+                stack.extend(children[0].map(|below| (below, None)));
             }
             Top::Part(part) => {
                 if let Some(part) = parts[*part].take() {

@@ -36,6 +36,20 @@
 //! visit both sides. So the rule "accept a hit only inside its cell" is not needed: what lies beyond the closest hit is
 //! passed over by its distance.
 //!
+//! # Where the time goes
+//!
+//! Loading nodes is what a walk waits for: on a scan of 69 000 triangles more than half of the samples of a profile fall there. So
+//! nodes are 8 bytes, and empty children, which are 14 to 70 % of all leaves in nine scenes, are no nodes at all. Against a tree that
+//! stores them this saves a fifth to a third of the bytes on four of these. Together with a walk that does not branch upon the axis
+//! of a node, nor upon the order of its children, it makes rays 1.02 to 1.26 times as fast (seven scenes, primary rays, chords and
+//! diffuse rays; 1.13 in the geometric mean).
+//!
+//! Rays are walked one by one. Walking them in flight, eight at a time, a node each in turn, was measured and left out: over a
+//! million triangles strewn at random it came to 1.24 (chords), 1.28 (diffuse rays) and 1.06 (primary rays), over 100 000 to 1.17, 1.14
+//! and 0.84, on the scan to 1.10, 0.98 and 0.74 times as fast. Two, four or eight rays that each go down to a
+//! leaf in turn came to 0.81 to 1.01. A node's work is too little to pay for changing rays, and the branches of coherent rays,
+//! foreseen well one ray at a time, are not any more.
+//!
 //! # Invariants
 //!
 //! At most [`MAX_DEPTH`] splits on a way, so the walk's stack has a fixed size. Equal input gives equal bytes at any thread count.

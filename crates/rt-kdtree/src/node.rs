@@ -9,7 +9,11 @@ use rt_geom::glam::{DVec3, Vec3A};
 /// The greatest number of splits on a way from the root to a leaf.
 pub const MAX_DEPTH: usize = 60;
 
-/// A split or a leaf, in 8 bytes; its box is implied. The child below a split is the next node, the child above is named.
+/// A split or a leaf, in 8 bytes; its box is implied.
+///
+/// The child below a split is the next node, the child above is named. A child without primitives is not stored: node 0, the root,
+/// is nobody's child, so a split that names it has nothing above; and one that names the next node as the child above has nothing
+/// below. Often more than half of all leaves are empty.
 ///
 /// Source: Wald, *Realtime Ray Tracing and Interactive Global Illumination*, PhD thesis, Saarland University (2004), section 7.2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -17,15 +21,23 @@ pub const MAX_DEPTH: usize = 60;
 pub struct Node {
     /// The bits of the split's position, or the leaf's first reference.
     place: u32,
-    /// Low two bits: the axis, or 3 for a leaf. Above: the child above, or how many references.
+    /// Low two bits: the axis, or 3 for a leaf. The others: the child above or 0, or how many references.
     link: u32,
 }
 
 /// What a node says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum View {
-    Split { axis: Axis, position: f32, above: usize },
-    Leaf { first: u32, count: usize },
+    /// Children are missing where there are no primitives.
+    Split {
+        axis: Axis,
+        position: f32,
+        children: [Option<usize>; 2],
+    },
+    Leaf {
+        first: u32,
+        count: usize,
+    },
 }
 
 impl Node {
@@ -45,7 +57,7 @@ impl Node {
         self.link & 3 == 3
     }
 
-    /// The child above, or how many references.
+    /// The child above or 0, or how many references.
     #[inline(always)]
     pub(crate) fn far(self) -> usize {
         (self.link >> 2) as usize
@@ -63,26 +75,27 @@ impl Node {
 
     #[inline(always)]
     pub(crate) fn axis(self) -> Axis {
-        match self.link & 3 {
-            0 => Axis::X,
-            1 => Axis::Y,
-            _ => Axis::Z,
-        }
+        // A look-up, since a branch on the axis would be guessed wrong too often.
+        const AXES: [Axis; 4] = [Axis::X, Axis::Y, Axis::Z, Axis::Z];
+        AXES[(self.link & 3) as usize]
     }
 
-    pub(crate) fn view(self) -> View {
+    /// What this node says as node `index`.
+    pub(crate) fn view(self, index: usize) -> View {
+        let far = self.far();
         if self.is_leaf() {
-            View::Leaf { first: self.first(), count: self.far() }
-        } else {
-            View::Split { axis: self.axis(), position: self.position(), above: self.far() }
+            return View::Leaf { first: self.first(), count: far };
         }
+        let children = [(far != index + 1).then_some(index + 1), (far != 0).then_some(far)];
+        View::Split { axis: self.axis(), position: self.position(), children }
     }
 
     /// The same node where nodes and references begin later.
     pub(crate) fn shifted(self, nodes: usize, refs: usize) -> Node {
-        match self.view() {
-            View::Leaf { first, count } => Node::leaf(first as usize + refs, count),
-            View::Split { axis, position, above } => Node::split(axis, position, above + nodes),
+        match self.far() {
+            count if self.is_leaf() => Node::leaf(self.first() as usize + refs, count),
+            0 => self,
+            above => Node::split(self.axis(), self.position(), above + nodes),
         }
     }
 }
@@ -108,7 +121,7 @@ pub struct Statistics {
     pub splits: usize,
     /// Leaves with primitives.
     pub leaves: usize,
-    /// Leaves without.
+    /// Leaves without, which are not stored.
     pub empty_leaves: usize,
     /// Primitives in leaves, each as often as it stands in one.
     pub references: usize,
@@ -138,13 +151,17 @@ impl KdTree {
     pub fn statistics(&self) -> Statistics {
         let mut s = Statistics::default();
         let whole = area(&self.bound);
-        self.each(&mut |node, cell, depth| {
+        self.each(&mut |view, cell, depth| {
             let share = if whole > 0.0 { area(cell) / whole } else { 1.0 };
             s.depth = s.depth.max(depth);
-            match node.view() {
-                View::Split { .. } => {
+            match view {
+                View::Split { children, .. } => {
                     s.splits += 1;
                     s.expected[0] += share;
+                    if children.contains(&None) {
+                        s.empty_leaves += 1;
+                        s.depth = s.depth.max(depth + 1);
+                    }
                 }
                 View::Leaf { count: 0, .. } => s.empty_leaves += 1,
                 View::Leaf { count, .. } => {
@@ -165,16 +182,17 @@ impl KdTree {
         self.sah.traverse as f64 * splits + self.sah.intersect as f64 * tests
     }
 
-    /// Calls `see` for every node, with its cell and the number of splits above.
-    pub(crate) fn each(&self, see: &mut dyn FnMut(Node, &Aabb, usize)) {
+    /// Calls `see` for every node, depth first, with its cell and the number of splits above.
+    pub(crate) fn each(&self, see: &mut dyn FnMut(View, &Aabb, usize)) {
         let mut stack = vec![(0, self.bound, 0)];
         while let Some((index, cell, depth)) = stack.pop() {
             let Some(&node) = self.nodes.get(index) else { continue };
-            see(node, &cell, depth);
-            if let View::Split { axis, position, above } = node.view() {
+            let view = node.view(index);
+            see(view, &cell, depth);
+            if let View::Split { axis, position, children: [below, above] } = view {
                 let (low, high) = cut(&cell, axis, position);
-                stack.push((above, high, depth + 1));
-                stack.push((index + 1, low, depth + 1));
+                stack.extend(above.map(|above| (above, high, depth + 1)));
+                stack.extend(below.map(|below| (below, low, depth + 1)));
             }
         }
     }
@@ -183,17 +201,20 @@ impl KdTree {
         let fail = |what: String| Err(Invalid(what));
         let mut times = vec![0u32; source.prim_count()];
         let (mut next_ref, mut seen, mut trouble) = (0usize, 0usize, None);
-        self.each(&mut |node, cell, depth| {
+        self.each(&mut |view, cell, depth| {
             seen += 1;
             let mut say = |what: String| trouble = trouble.take().or(Some(what));
-            match node.view() {
-                View::Split { axis, position, above } => {
+            match view {
+                View::Split { axis, position, children } => {
                     let a = axis.index();
                     if !(cell.min[a] <= position && position <= cell.max[a]) {
                         say(format!("a plane at {position} lies outside its cell {cell:?}"));
                     }
-                    if above >= self.nodes.len() {
-                        say(format!("a child is node {above}, which is none"));
+                    for child in children.into_iter().flatten().filter(|child| *child >= self.nodes.len()) {
+                        say(format!("a child is node {child}, which is none"));
+                    }
+                    if children == [None; 2] {
+                        say("a split has no children".into());
                     }
                     if depth >= MAX_DEPTH {
                         say(format!("the tree has {depth} splits on one way"));

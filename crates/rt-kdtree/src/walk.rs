@@ -1,6 +1,6 @@
 //! The traversal: near child first, far child on the stack, each with its interval of the ray.
 
-use crate::node::{KdTree, MAX_DEPTH, cut};
+use crate::node::{KdTree, MAX_DEPTH, View, cut};
 use arrayvec::ArrayVec;
 use rt_accel::{Leaf, Mailbox, Visitor};
 use rt_bounds::{Aabb, SlabRay};
@@ -15,33 +15,39 @@ impl KdTree {
         }
         let mut slab = SlabRay::new(ray, self.origin, &self.bound);
         let Some([mut enter, mut leave]) = slab.span(&self.bound) else { return };
-        let negative = slab.negative();
+        // All ones where a ray descends: it then meets the child above first.
+        let descends = slab.negative().map(|negative| (negative as u32).wrapping_neg());
         let mut mailbox = M::default();
         let mut stack = ArrayVec::<(u32, f32, f32), MAX_DEPTH>::new();
-        let mut at = 0usize;
+        let mut at = 0u32;
         loop {
-            let node = self.nodes[at];
-            if !node.is_leaf() {
+            let node = self.nodes[at as usize];
+            let next = if !node.is_leaf() {
                 visit.node();
                 let axis = node.axis();
                 let [from, to] = slab.crossing(axis, node.position());
-                let (first, second) =
-                    if negative[axis.index()] { (node.far(), at + 1) } else { (at + 1, node.far()) };
+                // Both numbers, 0 for a child that is empty, in the order of the ray; a branch would be guessed wrong too often.
+                let above = node.far() as u32;
+                let below = if above == at + 1 { 0 } else { at + 1 };
+                let swap = (below ^ above) & descends[axis.index()];
+                let (first, second) = (below ^ swap, above ^ swap);
                 if from > leave {
-                    at = first;
-                    leave = leave.min(to);
+                    first
                 } else if to < enter {
-                    at = second;
-                    enter = enter.max(from);
-                } else {
-                    let _ = stack.try_push((second as u32, enter.max(from), leave));
-                    at = first;
+                    second
+                } else if second == 0 {
                     leave = leave.min(to);
+                    first
+                } else if first == 0 {
+                    enter = enter.max(from);
+                    second
+                } else {
+                    let _ = stack.try_push((second, enter.max(from), leave));
+                    leave = leave.min(to);
+                    first
                 }
-                continue;
-            }
-            let first = node.first();
-            if node.far() > 0 {
+            } else {
+                let first = node.first();
                 let prims = self.prims.get(first as usize..first as usize + node.far()).unwrap_or(&[]);
                 let before = ray.t_max;
                 if mailbox.show(Leaf { first, prims }, ray, visit).is_break() {
@@ -50,12 +56,17 @@ impl KdTree {
                 if ray.t_max != before {
                     slab.shorten(ray.t_max);
                 }
+                0
+            };
+            if next != 0 {
+                at = next;
+                continue;
             }
             // Pop what is not beyond the closest hit so far.
             loop {
                 let Some(next) = stack.pop() else { return };
                 if next.1 <= slab.far() {
-                    (at, enter, leave) = (next.0 as usize, next.1, next.2.min(slab.far()));
+                    (at, enter, leave) = (next.0, next.1, next.2.min(slab.far()));
                     break;
                 }
             }
@@ -63,23 +74,26 @@ impl KdTree {
     }
 
     pub(crate) fn gather_under(&self, keep: &mut dyn FnMut(&Aabb) -> bool, each: &mut dyn FnMut(Leaf<'_>)) {
-        let mut stack = ArrayVec::<(u32, Aabb), { MAX_DEPTH + 1 }>::new();
+        let mut stack = ArrayVec::<(usize, Aabb), { MAX_DEPTH + 1 }>::new();
         stack.push((0, self.bound));
         while let Some((index, cell)) = stack.pop() {
-            let Some(&node) = self.nodes.get(index as usize) else { continue };
+            let Some(&node) = self.nodes.get(index) else { continue };
             if !keep(&cell.relative_to(-self.origin)) {
                 continue;
             }
-            if node.is_leaf() {
-                let first = node.first();
-                let prims = self.prims.get(first as usize..first as usize + node.far()).unwrap_or(&[]);
-                if !prims.is_empty() {
-                    each(Leaf { first, prims });
+            match node.view(index) {
+                View::Leaf { first, count } => {
+                    let prims = self.prims.get(first as usize..first as usize + count).unwrap_or(&[]);
+                    if !prims.is_empty() {
+                        each(Leaf { first, prims });
+                    }
                 }
-            } else {
-                let (low, high) = cut(&cell, node.axis(), node.position());
-                let _ = stack.try_push((node.far() as u32, high));
-                let _ = stack.try_push((index + 1, low));
+                View::Split { axis, position, children: [below, above] } => {
+                    let (low, high) = cut(&cell, axis, position);
+                    for (child, cell) in [(above, high), (below, low)] {
+                        let _ = child.map(|child| stack.try_push((child, cell)));
+                    }
+                }
             }
         }
     }

@@ -71,6 +71,20 @@ fn the_same_tree_on_any_number_of_threads() {
     one.validate(&mesh).unwrap();
 }
 
+/// A tree has one leaf more than splits; those without primitives are not stored.
+#[test]
+fn empty_leaves_are_not_stored() {
+    let mesh = soup::clusters(3000, 5);
+    for empty_bonus in [0.0, 0.9] {
+        let params = KdTreeParams { empty_bonus, ..KdTreeParams::default() };
+        let tree = KdTree::build(&mesh, &params).unwrap();
+        let s = tree.statistics();
+        assert_eq!(s.leaves + s.empty_leaves, s.splits + 1);
+        assert_eq!(tree.nodes().len(), s.splits + s.leaves);
+        assert!(s.empty_leaves > 1000, "{s:?}");
+    }
+}
+
 /// Two far cubes: the first splits cut off the void between them.
 #[test]
 fn empty_space_is_cut_off_first() {
