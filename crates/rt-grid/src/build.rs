@@ -5,6 +5,7 @@ use crate::grid::Grid;
 use crate::measure;
 use crate::params::{GridParams, Nest, Resolution, Skip};
 use crate::voxels::{Voxels, resolve, restrained};
+use core::ops::Range;
 use rt_accel::{
     Bounded, Boxes, BuildError, Clip, HashedMailbox, Invalid, InverseMailbox, Leaf, Mailing, NoMailbox,
     Structure, Visitor, Watch,
@@ -14,7 +15,10 @@ use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
 
 /// Parts that one thread deals out at a time: fixed, so that the grid does not depend on the number of threads.
-const ALONE: usize = 1 << 11;
+const ALONE: usize = 1 << 12;
+/// How many cells are filled together at least, and in how many lots all cells are filled at most: a lot stays in the nearer caches.
+const LEAST_LOT: usize = 1 << 14;
+const MOST_LOTS: usize = 128;
 /// How many cells the box of a primitive may overlap on average, in the first grid and in those within.
 pub(crate) const MOST_OVERLAPS: [u64; 2] = [256, 16];
 /// What entering a grid costs, in cells passed.
@@ -42,7 +46,10 @@ impl Structure for Grid {
         let Boxes { origin, prims, skipped, world } = Boxes::read(source)?;
         let valid = prims.len();
         let finite = |b: &Aabb| b.min.is_finite() && b.max.is_finite();
-        let (parts, without_end): (Vec<Part>, Vec<Part>) = prims.into_iter().partition(|(_, b)| finite(b));
+        let (parts, without_end): (Vec<Part>, Vec<Part>) = match prims.iter().all(|(_, b)| finite(b)) {
+            true => (prims, Vec::new()),
+            false => prims.into_iter().partition(|(_, b)| finite(b)),
+        };
         let outside: Vec<u32> = without_end.iter().map(|(prim, _)| *prim).collect();
         let mut grid = Grid {
             origin,
@@ -131,6 +138,71 @@ struct Filled {
     parts: Vec<Part>,
 }
 
+/// Which of some parts lie in which cells.
+struct Found {
+    /// A cell, and a part's number.
+    pairs: Vec<(u32, u32)>,
+    overlaps: u64,
+    /// Once sorted by lots: where the pairs of each lot end.
+    ends: Vec<u32>,
+}
+
+impl Found {
+    /// Brings together the pairs of each lot of cells, in the order they have. `lot` is a power of two.
+    fn sorted(mut self, lot: usize, cells: usize) -> Found {
+        let lots = cells.div_ceil(lot);
+        if lots == 1 {
+            self.ends = vec![self.pairs.len() as u32];
+            return self;
+        }
+        let shift = lot.trailing_zeros();
+        self.ends = vec![0; lots];
+        for (cell, _) in &self.pairs {
+            self.ends[(cell >> shift) as usize] += 1;
+        }
+        let mut sum = 0;
+        for end in &mut self.ends {
+            sum += core::mem::replace(end, sum);
+        }
+        let mut sorted = vec![(0, 0); self.pairs.len()];
+        for pair in &self.pairs {
+            let end = &mut self.ends[(pair.0 >> shift) as usize];
+            sorted[*end as usize] = *pair;
+            *end += 1;
+        }
+        self.pairs = sorted;
+        self
+    }
+}
+
+/// Fills a lot of cells: where each one's parts begin, and one more, where they end; and the parts, in ascending order for each.
+fn deal(found: &[Found], lot: usize, cells: Range<usize>) -> (Vec<u32>, Vec<u32>) {
+    let here = || {
+        found.iter().flat_map(|some| {
+            let from = lot.checked_sub(1).map_or(0, |before| some.ends[before]);
+            some.pairs[from as usize..some.ends[lot] as usize].iter()
+        })
+    };
+    let mut starts = vec![0u32; cells.len() + 1];
+    for (cell, _) in here() {
+        starts[*cell as usize - cells.start] += 1;
+    }
+    let mut sum = 0;
+    for start in &mut starts {
+        sum += core::mem::replace(start, sum);
+    }
+    let mut slots = vec![0u32; sum as usize];
+    for (cell, slot) in here() {
+        let place = &mut starts[*cell as usize - cells.start];
+        slots[*place as usize] = *slot;
+        *place += 1;
+    }
+    // Each start has become the next one's.
+    starts.copy_within(0..cells.len(), 1);
+    starts[0] = 0;
+    (starts, slots)
+}
+
 struct Builder<'a> {
     source: &'a dyn Bounded,
     origin: DVec3,
@@ -195,6 +267,8 @@ impl Builder<'_> {
         below: &mut Vec<Task>,
     ) -> Result<(), BuildError> {
         let Filled { mut voxels, starts, slots, overlaps, nested, parts } = filled;
+        // Where no number is left out, a part's number is its primitive's.
+        let numbered = parts.last().is_some_and(|(prim, _)| *prim as usize + 1 == parts.len());
         voxels.first = grid.kinds.len();
         let cells = starts.len() - 1;
         let most = u32::MAX as usize;
@@ -203,19 +277,27 @@ impl Builder<'_> {
         }
         self.within(grid.bytes() + cells * 5 + slots.len() * 4 + below.len() * size_of::<Task>())?;
         grid.overlaps += overlaps;
-        let mut nested = nested.into_iter().peekable();
-        for cell in 0..cells {
-            grid.starts.push(grid.refs.len() as u32);
-            let here = &slots[starts[cell] as usize..starts[cell + 1] as usize];
-            if let Some((_, task)) = nested.next_if(|(at, _)| *at == cell) {
-                grid.kinds.push(GRID);
-                grid.refs.push((first_below + below.len()) as u32);
-                below.push(task);
-            } else {
-                grid.kinds.push(if here.is_empty() { 1 } else { LEAF });
-                grid.refs.extend(here.iter().map(|slot| parts[*slot as usize].0));
+        let mut rest = 0;
+        let mut leaves = |grid: &mut Grid, to: usize| {
+            let base = (grid.refs.len() as u32).wrapping_sub(starts[rest]);
+            grid.starts.extend(starts[rest..to].iter().map(|start| start.wrapping_add(base)));
+            let ends = starts[rest..to].iter().zip(&starts[rest + 1..]);
+            grid.kinds.extend(ends.map(|(start, end)| if start == end { 1 } else { LEAF }));
+            let slots = &slots[starts[rest] as usize..starts[to] as usize];
+            match numbered {
+                true => grid.refs.extend_from_slice(slots),
+                false => grid.refs.extend(slots.iter().map(|slot| parts[*slot as usize].0)),
             }
+            rest = (to + 1).min(cells);
+        };
+        for (cell, task) in nested {
+            leaves(grid, cell);
+            grid.kinds.push(GRID);
+            grid.starts.push(grid.refs.len() as u32);
+            grid.refs.push((first_below + below.len()) as u32);
+            below.push(task);
         }
+        leaves(grid, cells);
         if self.params.skip == Skip::Clouds {
             spread(&mut grid.kinds[voxels.first..], voxels.count);
         }
@@ -233,14 +315,18 @@ impl Builder<'_> {
         let most = self.params.memory_limit.map_or(usize::MAX, |limit| (limit - held) / PER_REFERENCE);
         let most = most.min(u32::MAX as usize - 1);
         // Which parts lie in which cells, some parts at a time, on all cores.
+        let lot = cells.div_ceil(MOST_LOTS).next_power_of_two().max(LEAST_LOT);
         let chunks: Vec<(u32, &[Part])> =
             task.parts.chunks(ALONE).enumerate().map(|(i, chunk)| ((i * ALONE) as u32, chunk)).collect();
-        let mut pairs = Vec::new();
-        let mut total = 0;
+        let mut found = Vec::with_capacity(chunks.len());
+        let (mut total, mut overlaps) = (0, 0u64);
         for some in chunks.chunks(16) {
-            for found in grow(some.to_vec(), |(first, chunk)| self.register(&voxels, first, chunk, most)) {
-                total += found.len();
-                pairs.push(found);
+            for some in grow(some.to_vec(), |(first, chunk)| {
+                self.register(&voxels, first, chunk, most).sorted(lot, cells)
+            }) {
+                total += some.pairs.len();
+                overlaps = overlaps.saturating_add(some.overlaps);
+                found.push(some);
             }
             if total > most {
                 let needed = held.saturating_add(total.saturating_mul(PER_REFERENCE));
@@ -250,27 +336,17 @@ impl Builder<'_> {
                 };
             }
         }
-        // Counted, then put in place: ascending numbers in each cell.
-        let mut starts = vec![0u32; cells + 1];
-        for (cell, _) in pairs.iter().flatten() {
-            starts[*cell as usize + 1] += 1;
+        let lots: Vec<usize> = (0..cells.div_ceil(lot)).collect();
+        let mut dealt = grow(lots, |i| deal(&found, i, i * lot..cells.min((i + 1) * lot))).into_iter();
+        let (mut starts, mut slots) = dealt.next().unwrap_or_default();
+        starts.reserve_exact(cells + 1 - starts.len());
+        slots.reserve_exact(total - slots.len());
+        for (more_starts, more_slots) in dealt {
+            let base = starts.pop().unwrap_or(0);
+            starts.extend(more_starts.iter().map(|start| start + base));
+            slots.extend_from_slice(&more_slots);
         }
-        let mut sum = 0;
-        for start in &mut starts {
-            sum += *start;
-            *start = sum;
-        }
-        let mut slots = vec![0u32; total];
-        for (cell, slot) in pairs.iter().flatten() {
-            let place = &mut starts[*cell as usize];
-            slots[*place as usize] = *slot;
-            *place += 1;
-        }
-        // Each start has become the next one's.
-        starts.copy_within(0..cells, 1);
-        starts[0] = 0;
-        drop(pairs);
-        let overlaps = voxels.overlaps(task.parts.iter().map(|(_, part)| part));
+        drop(found);
         let mut filled = Filled { voxels, starts, slots, overlaps, nested: Vec::new(), parts: task.parts };
         if may_nest {
             filled.nested = self.nested(&filled);
@@ -279,13 +355,22 @@ impl Builder<'_> {
     }
 
     /// The cells of each part, and the part's number.
-    fn register(&self, voxels: &Voxels, first: u32, parts: &[Part], most: usize) -> Vec<(u32, u32)> {
-        let strides = voxels.strides();
-        let mut pairs = Vec::with_capacity(parts.len() * 2);
+    fn register(&self, voxels: &Voxels, first: u32, parts: &[Part], most: usize) -> Found {
+        let (strides, ruler) = (voxels.strides(), voxels.ruler());
+        let mut pairs = Vec::with_capacity(parts.len() * 4);
+        let mut overlaps = 0u64;
         for (slot, (prim, part)) in (first..).zip(parts) {
-            let whole = voxels.ranges(part);
+            let whole = ruler.ranges(part);
             // Rows along the axis of most cells; stacks of them along that of fewest.
             let spans = whole.map(|[from, to]| to - from);
+            if spans == [0; 3] {
+                overlaps += 1;
+                let cell: usize = (0..3).map(|a| whole[a][0] as usize * strides[a]).sum();
+                pairs.push((cell as u32, slot));
+                continue;
+            }
+            let boxes = spans.map(|span| span as u64 + 1).into_iter().product();
+            overlaps = overlaps.saturating_add(boxes);
             let (mut stack, mut row) = (0, 0);
             for a in 1..3 {
                 stack = if spans[a] < spans[stack] { a } else { stack };
@@ -321,7 +406,7 @@ impl Builder<'_> {
                     *part
                 };
                 let [from, to] = if cut {
-                    voxels.range(column, layer.min[column], layer.max[column])
+                    ruler.range(column, layer.min[column], layer.max[column])
                 } else {
                     whole[column]
                 };
@@ -330,14 +415,14 @@ impl Builder<'_> {
                     if !cut {
                         run(whole[row], at);
                     } else if from == to {
-                        run(voxels.range(row, layer.min[row], layer.max[row]), at);
+                        run(ruler.range(row, layer.min[row], layer.max[row]), at);
                     } else if let Some(piece) = cut_to(&layer, column, j) {
-                        run(voxels.range(row, piece.min[row], piece.max[row]), at);
+                        run(ruler.range(row, piece.min[row], piece.max[row]), at);
                     }
                 }
             }
         }
-        pairs
+        Found { pairs, overlaps, ends: Vec::new() }
     }
 
     /// The cells of a grid that shall be grids.
@@ -369,6 +454,7 @@ impl Builder<'_> {
         for slot in slots {
             let (prim, whole) = filled.parts[*slot as usize];
             let part = match self.params.clip {
+                _ if region.contains(whole) => whole,
                 Clip::Exact => {
                     self.source.clipped_bound(prim, &region, self.origin).overlap(whole).overlap(region)
                 }
@@ -390,7 +476,7 @@ impl Builder<'_> {
         };
         if self.params.nest == Nest::Cheaper {
             let inner = Voxels::new(&bound, count, 0);
-            let overlaps = inner.overlaps(parts.iter().map(|(_, part)| part)) as f64;
+            let overlaps = inner.ruler().overlaps(parts.iter().map(|(_, part)| part)) as f64;
             let share = |part: f64, whole: f64| if whole > 0.0 { (part / whole).min(1.0) } else { 1.0 };
             let [area, of_cell] = inner.areas();
             let entered = share(area, voxels.areas()[1]);
