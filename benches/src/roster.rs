@@ -34,6 +34,7 @@ structures! {
     "kdtree:box" => KdTree: KdTreeParams { clip: Clip::Box, ..KdTreeParams::default() },
     "grid" => Grid: GridParams::default(),
     "grid:nested" => Grid: GridParams::nested(),
+    "grid:hug" => Grid: GridParams::hug(),
     "grid:two-level" => Grid: GridParams::two_level(),
     "exhaustive" => Exhaustive: (),
 }

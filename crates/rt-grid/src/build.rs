@@ -2,6 +2,7 @@
 
 use crate::clouds::{GRID, LEAF, spread};
 use crate::grid::Grid;
+use crate::hug;
 use crate::measure;
 use crate::params::{GridParams, Nest, Resolution, Skip};
 use crate::voxels::{Voxels, resolve, restrained};
@@ -19,6 +20,8 @@ const ALONE: usize = 1 << 12;
 /// How many cells are filled together at least, and in how many lots all cells are filled at most: a lot stays in the nearer caches.
 const LEAST_LOT: usize = 1 << 14;
 const MOST_LOTS: usize = 128;
+/// How many clusters are asked whether they enclose something.
+const MOST_HOMES: usize = 64;
 /// How many cells the box of a primitive may overlap on average, in the first grid and in those within.
 pub(crate) const MOST_OVERLAPS: [u64; 2] = [256, 16];
 /// What entering a grid costs, in cells passed.
@@ -56,6 +59,7 @@ impl Structure for Grid {
             bound: world,
             grids: Vec::new(),
             kinds: Vec::new(),
+            first_link: len as u32,
             starts: Vec::new(),
             outside: outside.len(),
             refs: outside,
@@ -65,10 +69,12 @@ impl Structure for Grid {
             overlaps: 0,
         };
         if !parts.is_empty() {
-            Builder { source, origin, params, prims: valid }.build(parts, &mut grid, watch)?;
+            Builder { source, origin, params, prims: valid, first_link: len as u32 }
+                .build(parts, &mut grid, watch)?;
         }
-        let links = grid.grids.len().saturating_sub(1);
-        grid.repeats = grid.refs.len() - links > valid;
+        let links = grid.refs.iter().filter(|reference| **reference >= grid.first_link).count();
+        // A grid in two cells shows its leaves twice to a ray that goes from one to the other.
+        grid.repeats = grid.refs.len() - links > valid || links + 1 > grid.grids.len().max(1);
         grid.mailing = if grid.repeats { params.mailing } else { Mailing::None };
         if watch(1.0).is_break() {
             return Err(BuildError::Cancelled);
@@ -116,8 +122,15 @@ impl Structure for Grid {
     }
 }
 
-/// A primitive, and the box of what of it lies in the grid at hand.
+/// A primitive, and the box of what of it lies in the grid at hand. From the number of primitives on, the first member is a grid.
 pub(crate) type Part = (u32, Aabb);
+
+/// Parts of one class of size that hang together.
+struct Cluster {
+    class: u32,
+    bound: Aabb,
+    slots: Vec<u32>,
+}
 
 /// A grid to be filled.
 struct Task {
@@ -208,21 +221,21 @@ struct Builder<'a> {
     origin: DVec3,
     params: &'a GridParams,
     prims: usize,
+    first_link: u32,
 }
 
 impl Builder<'_> {
     fn build(&self, parts: Vec<Part>, grid: &mut Grid, watch: Watch<'_>) -> Result<(), BuildError> {
-        let bound = parts.iter().fold(Aabb::EMPTY, |b, (_, part)| b.union(*part));
-        let count = match self.params.resolution {
-            Resolution::Measured { rays } => measure::resolution(&bound, &parts, rays, self.params.sah),
-            rule => resolve(rule, &bound, parts.len()),
+        let mut tasks = match self.params.nest {
+            Nest::Sizes { classes, grown, least } => {
+                self.arranged(parts, classes.min(self.params.depth + 1), grown, least)?
+            }
+            _ => vec![self.task(parts, self.params.resolution)],
         };
-        let count = match self.params.resolution {
-            Resolution::Fixed(_) => count,
-            _ => restrained(count, &bound, &parts, MOST_OVERLAPS[0]),
+        let levels = match self.params.nest {
+            Nest::Never | Nest::Sizes { .. } => 0,
+            Nest::Above(_) | Nest::Cheaper => self.params.depth,
         };
-        let mut tasks = vec![Task { bound, parts, count }];
-        let levels = if self.params.nest == Nest::Never { 0 } else { self.params.depth };
         for level in 0..=levels {
             let (total, mut done) = (tasks.len(), 0);
             let first_below = grid.grids.len() + total;
@@ -258,6 +271,87 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// A grid that is no cell.
+    fn task(&self, parts: Vec<Part>, rule: Resolution) -> Task {
+        let bound = parts.iter().fold(Aabb::EMPTY, |b, (_, part)| b.union(*part));
+        let count = match rule {
+            Resolution::Measured { rays } => measure::resolution(&bound, &parts, rays, self.params.sah),
+            rule => resolve(rule, &bound, parts.len()),
+        };
+        let count = match rule {
+            Resolution::Fixed(_) => count,
+            _ => restrained(count, &bound, &parts, MOST_OVERLAPS[0]),
+        };
+        Task { bound, parts, count }
+    }
+
+    /// The grids of [`Nest::Sizes`], each before those that are objects of it.
+    fn arranged(&self, parts: Vec<Part>, most: u32, grown: f32, least: u32) -> Result<Vec<Task>, BuildError> {
+        // What the search for clusters takes.
+        self.within(parts.len().saturating_mul(size_of::<Part>() * 3 + 27 * size_of::<(u64, u32)>()))?;
+        let class = hug::classes(&parts, most);
+        let largest = class.iter().copied().max().unwrap_or(0);
+        let mut members = vec![Vec::new(); largest as usize + 1];
+        for (slot, class) in class.iter().enumerate() {
+            members[*class as usize].push(slot as u32);
+        }
+        let mut clusters: Vec<Cluster> = Vec::new();
+        for (class, members) in (0..largest).zip(&members) {
+            let found = hug::clusters(&parts, members, grown);
+            clusters.extend(found.into_iter().filter(|some| some.len() >= least as usize).map(|slots| {
+                let bound = slots.iter().fold(Aabb::EMPTY, |b, slot| b.union(parts[*slot as usize].1));
+                Cluster { class, bound, slots }
+            }));
+        }
+        if clusters.is_empty() {
+            return Ok(vec![self.task(parts, self.params.resolution)]);
+        }
+        let (len, max) = (self.first_link as usize + clusters.len(), u32::MAX as usize - 1);
+        if len > max {
+            return Err(BuildError::TooManyPrimitives { len, max });
+        }
+        // Enclosing ones first; a stable sort.
+        clusters.sort_by(|a, b| {
+            let by_size = || hug::diagonal(&b.bound).total_cmp(&hug::diagonal(&a.bound));
+            b.class.cmp(&a.class).then_with(by_size)
+        });
+        // The smallest cluster of a larger class around a box, found in a grid of clusters; the number of its own grid, or 0.
+        let link = |i: usize| self.first_link + 1 + i as u32;
+        let boxes = clusters.iter().enumerate().map(|(i, cluster)| (link(i), cluster.bound)).collect();
+        let lookup = self.filled(self.task(boxes, Resolution::Density(1.0)), false, 0)?;
+        let (ruler, strides) = (lookup.voxels.ruler(), lookup.voxels.strides());
+        let home = |class: u32, bound: &Aabb| {
+            let corner = ruler.ranges(&Aabb { min: bound.min, max: bound.min });
+            let within = lookup.voxels.bound().contains(*bound);
+            let cell: usize = (0..3).map(|a| corner[a][0] as usize * strides[a]).sum();
+            let here = &lookup.slots[lookup.starts[cell] as usize..lookup.starts[cell + 1] as usize];
+            let encloses = |i: &&u32| {
+                let cluster = &clusters[**i as usize];
+                cluster.class > class && cluster.bound.contains(*bound)
+            };
+            // Not to be had at any price.
+            let near = here.iter().rev().take(MOST_HOMES);
+            near.filter(|_| within).find(encloses).map_or(0, |i| *i as usize + 1)
+        };
+        let mut homes = vec![usize::MAX; parts.len()];
+        for (i, cluster) in clusters.iter().enumerate() {
+            for slot in &cluster.slots {
+                homes[*slot as usize] = i + 1;
+            }
+        }
+        let mut contents = vec![Vec::new(); clusters.len() + 1];
+        for ((part, class), at) in parts.iter().zip(&class).zip(homes) {
+            let at = if at == usize::MAX { home(*class, &part.1) } else { at };
+            contents[at].push(*part);
+        }
+        for (i, cluster) in clusters.iter().enumerate() {
+            contents[home(cluster.class, &cluster.bound)].push((link(i), cluster.bound));
+        }
+        drop(parts);
+        let mut rules = core::iter::once(self.params.resolution).chain(core::iter::repeat(self.params.inner));
+        Ok(contents.into_iter().filter_map(|parts| Some(self.task(parts, rules.next()?))).collect())
+    }
+
     /// Puts a filled grid behind the others.
     fn append(
         &self,
@@ -274,6 +368,9 @@ impl Builder<'_> {
         let most = u32::MAX as usize;
         if grid.refs.len() + slots.len() > most || voxels.first + cells > most {
             return Err(BuildError::TooManyPrimitives { len: grid.refs.len() + slots.len(), max: most });
+        }
+        if self.first_link as usize + first_below + below.len() + nested.len() > most {
+            return Err(BuildError::TooManyPrimitives { len: self.first_link as usize, max: most });
         }
         self.within(grid.bytes() + cells * 5 + slots.len() * 4 + below.len() * size_of::<Task>())?;
         grid.overlaps += overlaps;
@@ -294,10 +391,19 @@ impl Builder<'_> {
             leaves(grid, cell);
             grid.kinds.push(GRID);
             grid.starts.push(grid.refs.len() as u32);
-            grid.refs.push((first_below + below.len()) as u32);
+            grid.refs.push(self.first_link + (first_below + below.len()) as u32);
             below.push(task);
         }
         leaves(grid, cells);
+        // Objects that are grids come last, in the grid and in each cell.
+        if parts.last().is_some_and(|(prim, _)| *prim >= self.first_link) {
+            let ends = grid.starts[voxels.first + 1..].iter().copied().chain([grid.refs.len() as u32]);
+            for (kind, end) in grid.kinds[voxels.first..].iter_mut().zip(ends) {
+                if *kind == LEAF && grid.refs[end as usize - 1] >= self.first_link {
+                    *kind = GRID;
+                }
+            }
+        }
         if self.params.skip == Skip::Clouds {
             spread(&mut grid.kinds[voxels.first..], voxels.count);
         }
@@ -378,7 +484,7 @@ impl Builder<'_> {
             }
             let column = 3 - stack - row;
             // Along one axis there is nothing to cut: a part reaches through all of its box.
-            let cut = self.params.clip == Clip::Exact && spans[column] > 0;
+            let cut = self.params.clip == Clip::Exact && spans[column] > 0 && *prim < self.first_link;
             let cut_to = |within: &Aabb, a: usize, cell: u32| {
                 let mut region = *within;
                 let [low, high] = voxels.slab(a, cell);
@@ -441,7 +547,7 @@ impl Builder<'_> {
         let voxels = &filled.voxels;
         let slots = &filled.slots[filled.starts[cell] as usize..filled.starts[cell + 1] as usize];
         let least = match self.params.nest {
-            Nest::Never => return None,
+            Nest::Never | Nest::Sizes { .. } => return None,
             Nest::Above(most) => most as usize + 1,
             Nest::Cheaper => 2,
         };
