@@ -40,6 +40,11 @@ pub enum Resolution {
 }
 
 /// How rays pass through empty cells.
+///
+/// Macro cells (Parker, Parker, Livnat, Sloan, Hansen and Shirley, "Interactive ray tracing for volume visualization", 1999) are not
+/// among the ways. The nearest thing to them here, grids of 4 cells a side in the cells of one as much coarser ([`Nest::Above`] 0), took
+/// 9.3 steps a ray where clouds took 8.6, and a fifth more time, in a pyramid of rings; 8.4 to 6.2, and two fifths more, in a lattice.
+/// Where they won, it was by fewer tests in tight boxes, which is what [`Nest`] is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Skip {
     /// One after another.
@@ -151,7 +156,9 @@ impl GridParams {
     /// [`GridParams::nested`] takes to build.
     ///
     /// Two classes are best wherever it was measured: a field or a floor apart from all that stands on it. More classes part things that
-    /// share one space into grids that overlap, each of which a ray has to walk.
+    /// share one space into grids that overlap, each of which a ray has to walk. Time for a ray, to that of the default: 0.08 for a
+    /// tree in a field, 0.11 for a teapot in a stadium, 0.43 for a flake of balls, 1.06 for rings and 1.6 for a lattice, where spheres and
+    /// cylinders share the space. It was built in a tenth to two fifths of the time of [`GridParams::nested`].
     pub fn hug() -> GridParams {
         GridParams {
             inner: Resolution::Density(5.0),
