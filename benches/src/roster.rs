@@ -38,6 +38,7 @@ structures! {
     "bsp:axis" => Bsp: BspParams::axis_only(),
     "grid" => Grid: GridParams::default(),
     "grid:nested" => Grid: GridParams::nested(),
+    "grid:hug" => Grid: GridParams::hug(),
     "grid:two-level" => Grid: GridParams::two_level(),
     "octree" => Octree: OctreeParams::default(),
     "octree:classic" => Octree: OctreeParams::classic(4, 8),

@@ -2,9 +2,11 @@
 
 use crate::clouds::{GRID, LEAF, spread};
 use crate::grid::Grid;
+use crate::hug;
 use crate::measure;
 use crate::params::{GridParams, Nest, Resolution, Skip};
 use crate::voxels::{Voxels, resolve, restrained};
+use core::ops::Range;
 use rt_accel::{
     Bounded, Boxes, BuildError, Clip, HashedMailbox, Invalid, InverseMailbox, Leaf, Mailing, NoMailbox,
     Structure, Visitor, Watch,
@@ -14,7 +16,12 @@ use rt_geom::glam::DVec3;
 use rt_geom::{Ray, Real};
 
 /// Parts that one thread deals out at a time: fixed, so that the grid does not depend on the number of threads.
-const ALONE: usize = 1 << 11;
+const ALONE: usize = 1 << 12;
+/// How many cells are filled together at least, and in how many lots all cells are filled at most: a lot stays in the nearer caches.
+const LEAST_LOT: usize = 1 << 14;
+const MOST_LOTS: usize = 128;
+/// How many clusters are asked whether they enclose something.
+const MOST_HOMES: usize = 64;
 /// How many cells the box of a primitive may overlap on average, in the first grid and in those within.
 pub(crate) const MOST_OVERLAPS: [u64; 2] = [256, 16];
 /// What entering a grid costs, in cells passed.
@@ -42,13 +49,17 @@ impl Structure for Grid {
         let Boxes { origin, prims, skipped, world } = Boxes::read(source)?;
         let valid = prims.len();
         let finite = |b: &Aabb| b.min.is_finite() && b.max.is_finite();
-        let (parts, without_end): (Vec<Part>, Vec<Part>) = prims.into_iter().partition(|(_, b)| finite(b));
+        let (parts, without_end): (Vec<Part>, Vec<Part>) = match prims.iter().all(|(_, b)| finite(b)) {
+            true => (prims, Vec::new()),
+            false => prims.into_iter().partition(|(_, b)| finite(b)),
+        };
         let outside: Vec<u32> = without_end.iter().map(|(prim, _)| *prim).collect();
         let mut grid = Grid {
             origin,
             bound: world,
             grids: Vec::new(),
             kinds: Vec::new(),
+            first_link: len as u32,
             starts: Vec::new(),
             outside: outside.len(),
             refs: outside,
@@ -58,10 +69,12 @@ impl Structure for Grid {
             overlaps: 0,
         };
         if !parts.is_empty() {
-            Builder { source, origin, params, prims: valid }.build(parts, &mut grid, watch)?;
+            Builder { source, origin, params, prims: valid, first_link: len as u32 }
+                .build(parts, &mut grid, watch)?;
         }
-        let links = grid.grids.len().saturating_sub(1);
-        grid.repeats = grid.refs.len() - links > valid;
+        let links = grid.refs.iter().filter(|reference| **reference >= grid.first_link).count();
+        // A grid in two cells shows its leaves twice to a ray that goes from one to the other.
+        grid.repeats = grid.refs.len() - links > valid || links + 1 > grid.grids.len().max(1);
         grid.mailing = if grid.repeats { params.mailing } else { Mailing::None };
         if watch(1.0).is_break() {
             return Err(BuildError::Cancelled);
@@ -109,8 +122,15 @@ impl Structure for Grid {
     }
 }
 
-/// A primitive, and the box of what of it lies in the grid at hand.
+/// A primitive, and the box of what of it lies in the grid at hand. From the number of primitives on, the first member is a grid.
 pub(crate) type Part = (u32, Aabb);
+
+/// Parts of one class of size that hang together.
+struct Cluster {
+    class: u32,
+    bound: Aabb,
+    slots: Vec<u32>,
+}
 
 /// A grid to be filled.
 struct Task {
@@ -131,26 +151,91 @@ struct Filled {
     parts: Vec<Part>,
 }
 
+/// Which of some parts lie in which cells.
+struct Found {
+    /// A cell, and a part's number.
+    pairs: Vec<(u32, u32)>,
+    overlaps: u64,
+    /// Once sorted by lots: where the pairs of each lot end.
+    ends: Vec<u32>,
+}
+
+impl Found {
+    /// Brings together the pairs of each lot of cells, in the order they have. `lot` is a power of two.
+    fn sorted(mut self, lot: usize, cells: usize) -> Found {
+        let lots = cells.div_ceil(lot);
+        if lots == 1 {
+            self.ends = vec![self.pairs.len() as u32];
+            return self;
+        }
+        let shift = lot.trailing_zeros();
+        self.ends = vec![0; lots];
+        for (cell, _) in &self.pairs {
+            self.ends[(cell >> shift) as usize] += 1;
+        }
+        let mut sum = 0;
+        for end in &mut self.ends {
+            sum += core::mem::replace(end, sum);
+        }
+        let mut sorted = vec![(0, 0); self.pairs.len()];
+        for pair in &self.pairs {
+            let end = &mut self.ends[(pair.0 >> shift) as usize];
+            sorted[*end as usize] = *pair;
+            *end += 1;
+        }
+        self.pairs = sorted;
+        self
+    }
+}
+
+/// Fills a lot of cells: where each one's parts begin, and one more, where they end; and the parts, in ascending order for each.
+fn deal(found: &[Found], lot: usize, cells: Range<usize>) -> (Vec<u32>, Vec<u32>) {
+    let here = || {
+        found.iter().flat_map(|some| {
+            let from = lot.checked_sub(1).map_or(0, |before| some.ends[before]);
+            some.pairs[from as usize..some.ends[lot] as usize].iter()
+        })
+    };
+    let mut starts = vec![0u32; cells.len() + 1];
+    for (cell, _) in here() {
+        starts[*cell as usize - cells.start] += 1;
+    }
+    let mut sum = 0;
+    for start in &mut starts {
+        sum += core::mem::replace(start, sum);
+    }
+    let mut slots = vec![0u32; sum as usize];
+    for (cell, slot) in here() {
+        let place = &mut starts[*cell as usize - cells.start];
+        slots[*place as usize] = *slot;
+        *place += 1;
+    }
+    // Each start has become the next one's.
+    starts.copy_within(0..cells.len(), 1);
+    starts[0] = 0;
+    (starts, slots)
+}
+
 struct Builder<'a> {
     source: &'a dyn Bounded,
     origin: DVec3,
     params: &'a GridParams,
     prims: usize,
+    first_link: u32,
 }
 
 impl Builder<'_> {
     fn build(&self, parts: Vec<Part>, grid: &mut Grid, watch: Watch<'_>) -> Result<(), BuildError> {
-        let bound = parts.iter().fold(Aabb::EMPTY, |b, (_, part)| b.union(*part));
-        let count = match self.params.resolution {
-            Resolution::Measured { rays } => measure::resolution(&bound, &parts, rays, self.params.sah),
-            rule => resolve(rule, &bound, parts.len()),
+        let mut tasks = match self.params.nest {
+            Nest::Sizes { classes, grown, least } => {
+                self.arranged(parts, classes.min(self.params.depth + 1), grown, least)?
+            }
+            _ => vec![self.task(parts, self.params.resolution)],
         };
-        let count = match self.params.resolution {
-            Resolution::Fixed(_) => count,
-            _ => restrained(count, &bound, &parts, MOST_OVERLAPS[0]),
+        let levels = match self.params.nest {
+            Nest::Never | Nest::Sizes { .. } => 0,
+            Nest::Above(_) | Nest::Cheaper => self.params.depth,
         };
-        let mut tasks = vec![Task { bound, parts, count }];
-        let levels = if self.params.nest == Nest::Never { 0 } else { self.params.depth };
         for level in 0..=levels {
             let (total, mut done) = (tasks.len(), 0);
             let first_below = grid.grids.len() + total;
@@ -186,6 +271,87 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// A grid that is no cell.
+    fn task(&self, parts: Vec<Part>, rule: Resolution) -> Task {
+        let bound = parts.iter().fold(Aabb::EMPTY, |b, (_, part)| b.union(*part));
+        let count = match rule {
+            Resolution::Measured { rays } => measure::resolution(&bound, &parts, rays, self.params.sah),
+            rule => resolve(rule, &bound, parts.len()),
+        };
+        let count = match rule {
+            Resolution::Fixed(_) => count,
+            _ => restrained(count, &bound, &parts, MOST_OVERLAPS[0]),
+        };
+        Task { bound, parts, count }
+    }
+
+    /// The grids of [`Nest::Sizes`], each before those that are objects of it.
+    fn arranged(&self, parts: Vec<Part>, most: u32, grown: f32, least: u32) -> Result<Vec<Task>, BuildError> {
+        // What the search for clusters takes.
+        self.within(parts.len().saturating_mul(size_of::<Part>() * 3 + 27 * size_of::<(u64, u32)>()))?;
+        let class = hug::classes(&parts, most);
+        let largest = class.iter().copied().max().unwrap_or(0);
+        let mut members = vec![Vec::new(); largest as usize + 1];
+        for (slot, class) in class.iter().enumerate() {
+            members[*class as usize].push(slot as u32);
+        }
+        let mut clusters: Vec<Cluster> = Vec::new();
+        for (class, members) in (0..largest).zip(&members) {
+            let found = hug::clusters(&parts, members, grown);
+            clusters.extend(found.into_iter().filter(|some| some.len() >= least as usize).map(|slots| {
+                let bound = slots.iter().fold(Aabb::EMPTY, |b, slot| b.union(parts[*slot as usize].1));
+                Cluster { class, bound, slots }
+            }));
+        }
+        if clusters.is_empty() {
+            return Ok(vec![self.task(parts, self.params.resolution)]);
+        }
+        let (len, max) = (self.first_link as usize + clusters.len(), u32::MAX as usize - 1);
+        if len > max {
+            return Err(BuildError::TooManyPrimitives { len, max });
+        }
+        // Enclosing ones first; a stable sort.
+        clusters.sort_by(|a, b| {
+            let by_size = || hug::diagonal(&b.bound).total_cmp(&hug::diagonal(&a.bound));
+            b.class.cmp(&a.class).then_with(by_size)
+        });
+        // The smallest cluster of a larger class around a box, found in a grid of clusters; the number of its own grid, or 0.
+        let link = |i: usize| self.first_link + 1 + i as u32;
+        let boxes = clusters.iter().enumerate().map(|(i, cluster)| (link(i), cluster.bound)).collect();
+        let lookup = self.filled(self.task(boxes, Resolution::Density(1.0)), false, 0)?;
+        let (ruler, strides) = (lookup.voxels.ruler(), lookup.voxels.strides());
+        let home = |class: u32, bound: &Aabb| {
+            let corner = ruler.ranges(&Aabb { min: bound.min, max: bound.min });
+            let within = lookup.voxels.bound().contains(*bound);
+            let cell: usize = (0..3).map(|a| corner[a][0] as usize * strides[a]).sum();
+            let here = &lookup.slots[lookup.starts[cell] as usize..lookup.starts[cell + 1] as usize];
+            let encloses = |i: &&u32| {
+                let cluster = &clusters[**i as usize];
+                cluster.class > class && cluster.bound.contains(*bound)
+            };
+            // Not to be had at any price.
+            let near = here.iter().rev().take(MOST_HOMES);
+            near.filter(|_| within).find(encloses).map_or(0, |i| *i as usize + 1)
+        };
+        let mut homes = vec![usize::MAX; parts.len()];
+        for (i, cluster) in clusters.iter().enumerate() {
+            for slot in &cluster.slots {
+                homes[*slot as usize] = i + 1;
+            }
+        }
+        let mut contents = vec![Vec::new(); clusters.len() + 1];
+        for ((part, class), at) in parts.iter().zip(&class).zip(homes) {
+            let at = if at == usize::MAX { home(*class, &part.1) } else { at };
+            contents[at].push(*part);
+        }
+        for (i, cluster) in clusters.iter().enumerate() {
+            contents[home(cluster.class, &cluster.bound)].push((link(i), cluster.bound));
+        }
+        drop(parts);
+        let mut rules = core::iter::once(self.params.resolution).chain(core::iter::repeat(self.params.inner));
+        Ok(contents.into_iter().filter_map(|parts| Some(self.task(parts, rules.next()?))).collect())
+    }
+
     /// Puts a filled grid behind the others.
     fn append(
         &self,
@@ -195,25 +361,47 @@ impl Builder<'_> {
         below: &mut Vec<Task>,
     ) -> Result<(), BuildError> {
         let Filled { mut voxels, starts, slots, overlaps, nested, parts } = filled;
+        // Where no number is left out, a part's number is its primitive's.
+        let numbered = parts.last().is_some_and(|(prim, _)| *prim as usize + 1 == parts.len());
         voxels.first = grid.kinds.len();
         let cells = starts.len() - 1;
         let most = u32::MAX as usize;
         if grid.refs.len() + slots.len() > most || voxels.first + cells > most {
             return Err(BuildError::TooManyPrimitives { len: grid.refs.len() + slots.len(), max: most });
         }
+        if self.first_link as usize + first_below + below.len() + nested.len() > most {
+            return Err(BuildError::TooManyPrimitives { len: self.first_link as usize, max: most });
+        }
         self.within(grid.bytes() + cells * 5 + slots.len() * 4 + below.len() * size_of::<Task>())?;
         grid.overlaps += overlaps;
-        let mut nested = nested.into_iter().peekable();
-        for cell in 0..cells {
+        let mut rest = 0;
+        let mut leaves = |grid: &mut Grid, to: usize| {
+            let base = (grid.refs.len() as u32).wrapping_sub(starts[rest]);
+            grid.starts.extend(starts[rest..to].iter().map(|start| start.wrapping_add(base)));
+            let ends = starts[rest..to].iter().zip(&starts[rest + 1..]);
+            grid.kinds.extend(ends.map(|(start, end)| if start == end { 1 } else { LEAF }));
+            let slots = &slots[starts[rest] as usize..starts[to] as usize];
+            match numbered {
+                true => grid.refs.extend_from_slice(slots),
+                false => grid.refs.extend(slots.iter().map(|slot| parts[*slot as usize].0)),
+            }
+            rest = (to + 1).min(cells);
+        };
+        for (cell, task) in nested {
+            leaves(grid, cell);
+            grid.kinds.push(GRID);
             grid.starts.push(grid.refs.len() as u32);
-            let here = &slots[starts[cell] as usize..starts[cell + 1] as usize];
-            if let Some((_, task)) = nested.next_if(|(at, _)| *at == cell) {
-                grid.kinds.push(GRID);
-                grid.refs.push((first_below + below.len()) as u32);
-                below.push(task);
-            } else {
-                grid.kinds.push(if here.is_empty() { 1 } else { LEAF });
-                grid.refs.extend(here.iter().map(|slot| parts[*slot as usize].0));
+            grid.refs.push(self.first_link + (first_below + below.len()) as u32);
+            below.push(task);
+        }
+        leaves(grid, cells);
+        // Objects that are grids come last, in the grid and in each cell.
+        if parts.last().is_some_and(|(prim, _)| *prim >= self.first_link) {
+            let ends = grid.starts[voxels.first + 1..].iter().copied().chain([grid.refs.len() as u32]);
+            for (kind, end) in grid.kinds[voxels.first..].iter_mut().zip(ends) {
+                if *kind == LEAF && grid.refs[end as usize - 1] >= self.first_link {
+                    *kind = GRID;
+                }
             }
         }
         if self.params.skip == Skip::Clouds {
@@ -233,14 +421,18 @@ impl Builder<'_> {
         let most = self.params.memory_limit.map_or(usize::MAX, |limit| (limit - held) / PER_REFERENCE);
         let most = most.min(u32::MAX as usize - 1);
         // Which parts lie in which cells, some parts at a time, on all cores.
+        let lot = cells.div_ceil(MOST_LOTS).next_power_of_two().max(LEAST_LOT);
         let chunks: Vec<(u32, &[Part])> =
             task.parts.chunks(ALONE).enumerate().map(|(i, chunk)| ((i * ALONE) as u32, chunk)).collect();
-        let mut pairs = Vec::new();
-        let mut total = 0;
+        let mut found = Vec::with_capacity(chunks.len());
+        let (mut total, mut overlaps) = (0, 0u64);
         for some in chunks.chunks(16) {
-            for found in grow(some.to_vec(), |(first, chunk)| self.register(&voxels, first, chunk, most)) {
-                total += found.len();
-                pairs.push(found);
+            for some in grow(some.to_vec(), |(first, chunk)| {
+                self.register(&voxels, first, chunk, most).sorted(lot, cells)
+            }) {
+                total += some.pairs.len();
+                overlaps = overlaps.saturating_add(some.overlaps);
+                found.push(some);
             }
             if total > most {
                 let needed = held.saturating_add(total.saturating_mul(PER_REFERENCE));
@@ -250,27 +442,17 @@ impl Builder<'_> {
                 };
             }
         }
-        // Counted, then put in place: ascending numbers in each cell.
-        let mut starts = vec![0u32; cells + 1];
-        for (cell, _) in pairs.iter().flatten() {
-            starts[*cell as usize + 1] += 1;
+        let lots: Vec<usize> = (0..cells.div_ceil(lot)).collect();
+        let mut dealt = grow(lots, |i| deal(&found, i, i * lot..cells.min((i + 1) * lot))).into_iter();
+        let (mut starts, mut slots) = dealt.next().unwrap_or_default();
+        starts.reserve_exact(cells + 1 - starts.len());
+        slots.reserve_exact(total - slots.len());
+        for (more_starts, more_slots) in dealt {
+            let base = starts.pop().unwrap_or(0);
+            starts.extend(more_starts.iter().map(|start| start + base));
+            slots.extend_from_slice(&more_slots);
         }
-        let mut sum = 0;
-        for start in &mut starts {
-            sum += *start;
-            *start = sum;
-        }
-        let mut slots = vec![0u32; total];
-        for (cell, slot) in pairs.iter().flatten() {
-            let place = &mut starts[*cell as usize];
-            slots[*place as usize] = *slot;
-            *place += 1;
-        }
-        // Each start has become the next one's.
-        starts.copy_within(0..cells, 1);
-        starts[0] = 0;
-        drop(pairs);
-        let overlaps = voxels.overlaps(task.parts.iter().map(|(_, part)| part));
+        drop(found);
         let mut filled = Filled { voxels, starts, slots, overlaps, nested: Vec::new(), parts: task.parts };
         if may_nest {
             filled.nested = self.nested(&filled);
@@ -279,13 +461,22 @@ impl Builder<'_> {
     }
 
     /// The cells of each part, and the part's number.
-    fn register(&self, voxels: &Voxels, first: u32, parts: &[Part], most: usize) -> Vec<(u32, u32)> {
-        let strides = voxels.strides();
-        let mut pairs = Vec::with_capacity(parts.len() * 2);
+    fn register(&self, voxels: &Voxels, first: u32, parts: &[Part], most: usize) -> Found {
+        let (strides, ruler) = (voxels.strides(), voxels.ruler());
+        let mut pairs = Vec::with_capacity(parts.len() * 4);
+        let mut overlaps = 0u64;
         for (slot, (prim, part)) in (first..).zip(parts) {
-            let whole = voxels.ranges(part);
+            let whole = ruler.ranges(part);
             // Rows along the axis of most cells; stacks of them along that of fewest.
             let spans = whole.map(|[from, to]| to - from);
+            if spans == [0; 3] {
+                overlaps += 1;
+                let cell: usize = (0..3).map(|a| whole[a][0] as usize * strides[a]).sum();
+                pairs.push((cell as u32, slot));
+                continue;
+            }
+            let boxes = spans.map(|span| span as u64 + 1).into_iter().product();
+            overlaps = overlaps.saturating_add(boxes);
             let (mut stack, mut row) = (0, 0);
             for a in 1..3 {
                 stack = if spans[a] < spans[stack] { a } else { stack };
@@ -293,7 +484,7 @@ impl Builder<'_> {
             }
             let column = 3 - stack - row;
             // Along one axis there is nothing to cut: a part reaches through all of its box.
-            let cut = self.params.clip == Clip::Exact && spans[column] > 0;
+            let cut = self.params.clip == Clip::Exact && spans[column] > 0 && *prim < self.first_link;
             let cut_to = |within: &Aabb, a: usize, cell: u32| {
                 let mut region = *within;
                 let [low, high] = voxels.slab(a, cell);
@@ -321,7 +512,7 @@ impl Builder<'_> {
                     *part
                 };
                 let [from, to] = if cut {
-                    voxels.range(column, layer.min[column], layer.max[column])
+                    ruler.range(column, layer.min[column], layer.max[column])
                 } else {
                     whole[column]
                 };
@@ -330,14 +521,14 @@ impl Builder<'_> {
                     if !cut {
                         run(whole[row], at);
                     } else if from == to {
-                        run(voxels.range(row, layer.min[row], layer.max[row]), at);
+                        run(ruler.range(row, layer.min[row], layer.max[row]), at);
                     } else if let Some(piece) = cut_to(&layer, column, j) {
-                        run(voxels.range(row, piece.min[row], piece.max[row]), at);
+                        run(ruler.range(row, piece.min[row], piece.max[row]), at);
                     }
                 }
             }
         }
-        pairs
+        Found { pairs, overlaps, ends: Vec::new() }
     }
 
     /// The cells of a grid that shall be grids.
@@ -356,7 +547,7 @@ impl Builder<'_> {
         let voxels = &filled.voxels;
         let slots = &filled.slots[filled.starts[cell] as usize..filled.starts[cell + 1] as usize];
         let least = match self.params.nest {
-            Nest::Never => return None,
+            Nest::Never | Nest::Sizes { .. } => return None,
             Nest::Above(most) => most as usize + 1,
             Nest::Cheaper => 2,
         };
@@ -369,6 +560,7 @@ impl Builder<'_> {
         for slot in slots {
             let (prim, whole) = filled.parts[*slot as usize];
             let part = match self.params.clip {
+                _ if region.contains(whole) => whole,
                 Clip::Exact => {
                     self.source.clipped_bound(prim, &region, self.origin).overlap(whole).overlap(region)
                 }
@@ -390,7 +582,7 @@ impl Builder<'_> {
         };
         if self.params.nest == Nest::Cheaper {
             let inner = Voxels::new(&bound, count, 0);
-            let overlaps = inner.overlaps(parts.iter().map(|(_, part)| part)) as f64;
+            let overlaps = inner.ruler().overlaps(parts.iter().map(|(_, part)| part)) as f64;
             let share = |part: f64, whole: f64| if whole > 0.0 { (part / whole).min(1.0) } else { 1.0 };
             let [area, of_cell] = inner.areas();
             let entered = share(area, voxels.areas()[1]);

@@ -5,6 +5,8 @@
 pub(crate) const LEAF: u8 = 0;
 /// A cell that is a grid.
 pub(crate) const GRID: u8 = 255;
+/// As far as counts.
+const FAR: u8 = 254;
 
 /// Turns the 1 of each empty cell into its distance. `O(cells)`: two passes over half of the neighbours each, which is exact for
 /// this metric. What lies outside of the grid is as empty as can be.
@@ -13,17 +15,18 @@ pub(crate) const GRID: u8 = 255;
 pub(crate) fn spread(kinds: &mut [u8], count: [u32; 3]) {
     let n = count.map(|n| n as usize);
     let index = |c: [usize; 3]| (c[2] * n[1] + c[1]) * n[0] + c[0];
-    let near = |kind: u8| if kind == GRID { 0 } else { kind };
-    for kind in kinds.iter_mut().filter(|kind| **kind == 1) {
-        *kind = 254;
+    // 0 for a grid, without a branch.
+    let near = |kind: u8| kind.wrapping_add(1).saturating_sub(1);
+    for kind in kinds.iter_mut() {
+        *kind = if *kind == 1 { FAR } else { *kind };
     }
     // The least of the rows before this one, then along the row: forth, and the same back.
-    let mut row = vec![254u8; n[0] + 2];
+    let mut row = vec![FAR; n[0] + 2];
     for back in [false, true] {
         let order = |i: usize, n: usize| if back { n - 1 - i } else { i };
         for z in (0..n[2]).map(|z| order(z, n[2])) {
             for y in (0..n[1]).map(|y| order(y, n[1])) {
-                row.fill(254);
+                row.fill(FAR);
                 let z_before = if back { z + 1 } else { z.wrapping_sub(1) };
                 let y_before = if back { y + 1 } else { y.wrapping_sub(1) };
                 let mut take = |y: usize, z: usize| {
@@ -39,15 +42,21 @@ pub(crate) fn spread(kinds: &mut [u8], count: [u32; 3]) {
                 }
                 take(y_before, z);
                 let from = index([0, y, z]);
-                let mut last = 254;
-                for x in (0..n[0]).map(|x| order(x, n[0])) {
-                    let least = row[x].min(row[x + 1]).min(row[x + 2]).min(last);
-                    let kind = &mut kinds[from + x];
-                    if *kind != LEAF && *kind != GRID {
-                        *kind = (*kind).min((least + 1).min(254));
-                    }
-                    last = near(*kind);
+                let here = &mut kinds[from..from + n[0]];
+                let around = row.iter().zip(&row[1..]).zip(&row[2..]);
+                for (kind, ((a, b), c)) in here.iter_mut().zip(around) {
+                    let least = (*a.min(b).min(c) + 1).min(FAR);
+                    *kind = if *kind == GRID { GRID } else { (*kind).min(least) };
                 }
+                let along = |last: u8, kind: &mut u8| {
+                    let least = near(*kind).min(last + 1);
+                    *kind = if *kind == GRID { GRID } else { least };
+                    least
+                };
+                match back {
+                    false => here.iter_mut().fold(FAR, along),
+                    true => here.iter_mut().rev().fold(FAR, along),
+                };
             }
         }
     }

@@ -20,11 +20,13 @@ pub struct Grid {
     pub(crate) bound: Aabb,
     /// The first one holds all finite bounds; those within follow, level by level.
     pub(crate) grids: Vec<Voxels>,
+    /// How many primitives there are.
+    pub(crate) first_link: u32,
     /// What each cell is: see [`LEAF`].
     pub(crate) kinds: Vec<u8>,
     /// Where the references of each cell begin; one more, where the last ends.
     pub(crate) starts: Vec<u32>,
-    /// Primitives; for a cell that is a grid, one number: which.
+    /// Primitives, then grids, counted from `first_link`.
     pub(crate) refs: Vec<u32>,
     /// How many references, the first ones, are of primitives with infinite bounds.
     pub(crate) outside: usize,
@@ -74,39 +76,56 @@ impl Grid {
         for (g, grid) in self.grids.iter().enumerate() {
             s.depth = s.depth.max(depths[g]);
             for cell in grid.first..grid.first + grid.cells() {
-                match self.kinds[cell] {
-                    LEAF => {
-                        s.references += self.prims(cell).len();
-                        s.largest_cell = s.largest_cell.max(self.prims(cell).len());
+                if !matches!(self.kinds[cell], LEAF | GRID) {
+                    s.empty += 1;
+                    continue;
+                }
+                let prims = self.leaf(cell).prims.len();
+                s.references += prims;
+                s.largest_cell = s.largest_cell.max(prims);
+                let next = depths[g] + 1;
+                for inner in self.inner(cell) {
+                    if let Some(depth) = depths.get_mut(inner) {
+                        *depth = next.max(*depth);
                     }
-                    GRID => {
-                        if let Some(depth) = depths.get_mut(self.inner(cell)) {
-                            *depth = s.depth + 1;
-                        }
-                    }
-                    _ => s.empty += 1,
                 }
             }
         }
         s
     }
 
-    /// The references of a cell.
+    /// The primitives of a cell.
     #[inline(always)]
     pub(crate) fn leaf(&self, cell: usize) -> Leaf<'_> {
-        Leaf { first: self.starts[cell], prims: self.prims(cell) }
+        let refs = self.refs(cell);
+        let links = match self.kinds[cell] {
+            GRID => self.links(cell),
+            _ => 0,
+        };
+        Leaf { first: self.starts[cell], prims: &refs[..refs.len() - links] }
+    }
+
+    /// How many grids there are in a cell.
+    #[inline(always)]
+    pub(crate) fn links(&self, cell: usize) -> usize {
+        self.refs(cell).iter().rev().take_while(|reference| **reference >= self.first_link).count()
     }
 
     #[inline(always)]
-    fn prims(&self, cell: usize) -> &[u32] {
+    fn refs(&self, cell: usize) -> &[u32] {
         let (from, to) = (self.starts[cell] as usize, self.starts[cell + 1] as usize);
         self.refs.get(from..to).unwrap_or(&[])
     }
 
-    /// The grid that a cell is.
+    /// The grid that is `links` from the end of a cell's references.
     #[inline(always)]
-    pub(crate) fn inner(&self, cell: usize) -> usize {
-        self.refs[self.starts[cell] as usize] as usize
+    pub(crate) fn link(&self, cell: usize, links: u32) -> usize {
+        (self.refs[(self.starts[cell + 1] - links) as usize] - self.first_link) as usize
+    }
+
+    /// The grids in a cell.
+    pub(crate) fn inner(&self, cell: usize) -> impl Iterator<Item = usize> {
+        (1..=self.links(cell) as u32).rev().map(move |links| self.link(cell, links))
     }
 
     /// The primitives with infinite bounds.
@@ -123,6 +142,8 @@ impl Grid {
             each(self.outside());
         }
         let mut waiting: Vec<usize> = if self.grids.is_empty() { Vec::new() } else { vec![0] };
+        // A grid may stand in several cells.
+        let mut seen = vec![false; self.grids.len()];
         while let Some(g) = waiting.pop() {
             let grid = &self.grids[g];
             let [nx, ny, nz] = grid.count;
@@ -150,8 +171,16 @@ impl Grid {
                     }
                     for x in 0..nx {
                         match self.kinds[cell] {
-                            LEAF if kept(&mut within, 0, x) => each(self.leaf(cell)),
-                            GRID if kept(&mut within, 0, x) => waiting.push(self.inner(cell)),
+                            LEAF | GRID if kept(&mut within, 0, x) => {
+                                let leaf = self.leaf(cell);
+                                if !leaf.prims.is_empty() {
+                                    each(leaf);
+                                }
+                                if self.kinds[cell] == GRID {
+                                    let new = |inner: &usize| !core::mem::replace(&mut seen[*inner], true);
+                                    waiting.extend(self.inner(cell).filter(new));
+                                }
+                            }
                             _ => {}
                         }
                         cell += 1;
@@ -186,8 +215,12 @@ impl Grid {
         if self.starts.windows(2).any(|pair| pair[0] > pair[1]) {
             return fail("cells are not in order".to_string());
         }
-        let (mut next_cell, mut next_grid) = (0, 1);
-        for grid in &self.grids {
+        let mut next_cell = 0;
+        let mut linked = vec![false; self.grids.len()];
+        if let Some(first) = linked.first_mut() {
+            *first = true;
+        }
+        for (g, grid) in self.grids.iter().enumerate() {
             if grid.first != next_cell {
                 return fail(format!(
                     "a grid begins at cell {}, the one before it ended at {next_cell}",
@@ -199,14 +232,14 @@ impl Grid {
                 return fail("a grid has more cells than there are".to_string());
             }
             for (index, cell) in (grid.first..next_cell).enumerate() {
-                let prims = self.prims(cell);
+                let prims = self.leaf(cell).prims;
                 let at = grid.at(index);
                 let bound = grid.cell(at);
                 match self.kinds[cell] {
-                    LEAF if prims.is_empty() => {
-                        return fail(format!("cell {at:?} is empty and is called a leaf"));
-                    }
-                    LEAF => {
+                    LEAF | GRID => {
+                        if prims.is_empty() && self.kinds[cell] == LEAF {
+                            return fail(format!("cell {at:?} is empty and is called a leaf"));
+                        }
                         for &prim in prims {
                             count(prim)?;
                             if source.bound_from(prim, self.origin).overlap(bound).is_empty() {
@@ -218,14 +251,22 @@ impl Grid {
                         if prims.windows(2).any(|pair| pair[0] >= pair[1]) {
                             return fail(format!("cell {at:?} is not in ascending order"));
                         }
-                    }
-                    GRID => {
-                        if prims != [next_grid] || next_grid as usize >= self.grids.len() {
-                            return fail(format!(
-                                "cell {at:?} is grid {prims:?}, and grid {next_grid} was next"
-                            ));
+                        if self.kinds[cell] == LEAF {
+                            continue;
                         }
-                        next_grid += 1;
+                        if self.links(cell) == 0 {
+                            return fail(format!("cell {at:?} is called a grid and has none"));
+                        }
+                        for inner in self.inner(cell) {
+                            // Each after those it is in, so that none is in itself.
+                            let Some(found) = self.grids.get(inner).filter(|_| inner > g) else {
+                                return fail(format!("cell {at:?} of grid {g} holds grid {inner}"));
+                            };
+                            if found.bound().overlap(bound).is_empty() {
+                                return fail(format!("grid {inner} does not reach into its cell {bound:?}"));
+                            }
+                            linked[inner] = true;
+                        }
                     }
                     empty => {
                         if !prims.is_empty() {
@@ -236,8 +277,8 @@ impl Grid {
                 }
             }
         }
-        if next_cell != self.kinds.len() || next_grid as usize != self.grids.len().max(1) {
-            return fail(format!("{next_cell} cells and {next_grid} grids hang in the grid"));
+        if next_cell != self.kinds.len() || linked.contains(&false) {
+            return fail(format!("{next_cell} cells hang in the grid, or not all grids do"));
         }
         for &prim in &self.skipped {
             if core::mem::replace(&mut times[prim as usize], 1) != 0 {

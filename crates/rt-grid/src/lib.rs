@@ -1,7 +1,8 @@
 //! Grids: space in equal cells, each with the primitives that reach into it.
 //!
 //! A [`Grid`] cuts the box of a scene into cells of one size, in one array, with the numbers of primitives in another. Where primitives
-//! are crowded, a cell may itself be a grid over the tight box of what is in it ([`GridParams::nested`], [`GridParams::two_level`]).
+//! are crowded, a cell may itself be a grid over the tight box of what is in it ([`GridParams::nested`], [`GridParams::two_level`]); or
+//! what is small and hangs together is a grid of its own, and an object of a larger one ([`GridParams::hug`]).
 //! Rays walk the cells near to far, and leap over empty ones.
 //!
 //! ```
@@ -49,7 +50,8 @@
 //!    by an error bound made for this ray, and ends early only where the next cell is entered beyond `ray.t_max`. A hit found in one
 //!    cell and lying in a later one shortens `t_max` and is kept; cells before it are still visited.
 //! 5. *Grids in cells.* The box of an inner grid contains the parts of all the cell's primitives within the cell, made larger as in 3.;
-//!    hence `P`. It is walked between the two times at which the outer walk enters and leaves the cell; `t` is one of those by 2.
+//!    hence `P`. It is walked between the two times at which the outer walk enters and leaves the cell; `t` is one of those by 2. A grid
+//!    that is an object ([`Nest::Sizes`]) contains its primitives whole, and is registered by its box as a primitive would be.
 //!
 //! A ray that starts too far away for 1. is carried nearer along itself, with twice the digits: the new origin is within
 //! `2^-102` of the way, which may be `2^-28` of a side at most, and one rounding of itself. One that is too far even for that (some 2^70 sides) visits every reference of the grid.
@@ -64,6 +66,7 @@
 mod build;
 mod clouds;
 mod grid;
+mod hug;
 mod measure;
 mod params;
 mod voxels;

@@ -53,12 +53,12 @@ pub(crate) fn resolution(bound: &Aabb, parts: &[Part], rays: u32, sah: Sah) -> [
 
 /// What the samples cost in a grid; the first one says where they end.
 fn expense(voxels: &Voxels, parts: &[Part], samples: &mut [Sample], sah: Sah, first: bool) -> f64 {
-    let strides = voxels.strides();
+    let (strides, ruler) = (voxels.strides(), voxels.ruler());
     let mut refs = vec![0u32; voxels.cells()];
     let mut opaque = vec![0f32; if first { refs.len() } else { 0 }];
     let volume: f64 = voxels.width.iter().product();
     for (_, part) in parts {
-        let [x, y, z] = voxels.ranges(part);
+        let [x, y, z] = ruler.ranges(part);
         let s = part.size().as_dvec3();
         let flake = 0.25 * DVec3::new(s.y * s.z, s.z * s.x, s.x * s.y).length();
         let cells: f64 = [x, y, z].iter().map(|[from, to]| (to - from + 1) as f64).product();

@@ -40,6 +40,11 @@ pub enum Resolution {
 }
 
 /// How rays pass through empty cells.
+///
+/// Macro cells (Parker, Parker, Livnat, Sloan, Hansen and Shirley, "Interactive ray tracing for volume visualization", 1999) are not
+/// among the ways. The nearest thing to them here, grids of 4 cells a side in the cells of one as much coarser ([`Nest::Above`] 0), took
+/// 9.3 steps a ray where clouds took 8.6, and a fifth more time, in a pyramid of rings; 8.4 to 6.2, and two fifths more, in a lattice.
+/// Where they won, it was by fewer tests in tight boxes, which is what [`Nest`] is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Skip {
     /// One after another.
@@ -51,7 +56,9 @@ pub enum Skip {
 }
 
 /// Which cells become grids of their own, over the tight box of what is in them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+///
+/// [`Nest::Sizes`] goes the other way, from primitives instead of cells: its grids are objects that reach into cells as primitives do.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Nest {
     /// None: the grid is uniform.
     Never,
@@ -61,6 +68,23 @@ pub enum Nest {
     Above(u32),
     /// Those where that lowers the expected cost of a ray by [`GridParams::sah`].
     Cheaper,
+    /// None; but primitives are parted into classes of size, at the widest gaps between sizes, and in each class but the largest
+    /// those that hang together become a grid. It is an object of the smallest grid of a larger class that encloses it, or of the first
+    /// grid; so are primitives in clusters that are too small.
+    ///
+    /// Sizes are diagonals of boxes; those within a tenth of each other are never parted. Of evenly spread sizes nothing
+    /// is gained. Grids within are never cut to cells: one that reaches into several is walked a part at a time.
+    ///
+    /// Source: Cazals, Drettakis and Puech, "Filtering, clustering and hierarchy construction: a new solution for ray-tracing complex
+    /// scenes", CGF 14(3) 1995, with gaps in the place of their histogram.
+    Sizes {
+        /// How many classes at most; no more than [`GridParams::depth`] and one.
+        classes: u32,
+        /// By how much of its diagonal a box grows on each side before those that overlap are said to hang together.
+        grown: f32,
+        /// How many primitives a grid has at least.
+        least: u32,
+    },
 }
 
 /// The knobs of a [`Grid`](crate::Grid).
@@ -128,6 +152,21 @@ impl GridParams {
         }
     }
 
+    /// A grid for each cluster of primitives of like size: for small things in a wide space, at a fraction of the time that
+    /// [`GridParams::nested`] takes to build.
+    ///
+    /// Two classes are best wherever it was measured: a field or a floor apart from all that stands on it. More classes part things that
+    /// share one space into grids that overlap, each of which a ray has to walk. Time for a ray, to that of the default: 0.08 for a
+    /// tree in a field, 0.11 for a teapot in a stadium, 0.43 for a flake of balls, 1.06 for rings and 1.6 for a lattice, where spheres and
+    /// cylinders share the space. It was built in a tenth to two fifths of the time of [`GridParams::nested`].
+    pub fn hug() -> GridParams {
+        GridParams {
+            inner: Resolution::Density(5.0),
+            nest: Nest::Sizes { classes: 2, grown: 0.3, least: 8 },
+            ..GridParams::default()
+        }
+    }
+
     pub(crate) fn check(&self) -> Result<(), BuildError> {
         let bad = |name, why| Err(BuildError::BadParam { name, why });
         for (name, resolution) in [("resolution", self.resolution), ("inner", self.inner)] {
@@ -154,6 +193,14 @@ impl GridParams {
                     }
                 }
                 Resolution::Pharr => {}
+            }
+        }
+        if let Nest::Sizes { classes, grown, least } = self.nest {
+            if classes == 0 || least == 0 {
+                return bad("nest", "must have a class and a primitive at least");
+            }
+            if !(grown >= 0.0 && grown.is_finite()) {
+                return bad("nest", "must grow boxes by a finite share, not negative");
             }
         }
         if self.depth as usize > crate::grid::MAX_DEPTH {

@@ -145,6 +145,8 @@ pub(crate) struct Walk {
     left: [u32; 3],
     /// To the next cell's index.
     stride: [isize; 3],
+    /// How many of the grids in the cell are still to be walked.
+    links: u32,
     line: Line,
 }
 
@@ -164,6 +166,7 @@ impl Walk {
             step: [1.0; 3],
             left: [0; 3],
             stride: [0; 3],
+            links: 0,
             line,
         };
         for a in 0..3 {
@@ -332,17 +335,21 @@ impl Grid {
                     walk.advance()
                 }
                 GRID => {
-                    match self.descend(&walk, ray, visit) {
+                    walk.links = self.links(walk.cell) as u32;
+                    let leaf = self.leaf(walk.cell);
+                    if !leaf.prims.is_empty() && mailbox.show(leaf, ray, visit).is_break() {
+                        return;
+                    }
+                    walk.line.shorten(ray.t_max);
+                    match self.descend(&mut walk, ray, visit) {
                         ControlFlow::Break(()) => return,
                         ControlFlow::Continue(Some(inner)) => {
                             let _ = stack.try_push(walk);
                             walk = inner;
                             continue;
                         }
-                        ControlFlow::Continue(None) => {}
+                        ControlFlow::Continue(None) => walk.advance(),
                     }
-                    walk.line.shorten(ray.t_max);
-                    walk.advance()
                 }
                 distance if distance < LEAP => walk.advance(),
                 distance => walk.leap(distance as u32),
@@ -355,6 +362,17 @@ impl Grid {
                 let Some(outer) = stack.pop() else { return };
                 walk = outer;
                 walk.line.shorten(ray.t_max);
+                if walk.links > 0 {
+                    match self.descend(&mut walk, ray, visit) {
+                        ControlFlow::Break(()) => return,
+                        ControlFlow::Continue(Some(inner)) => {
+                            let _ = stack.try_push(walk);
+                            walk = inner;
+                            break;
+                        }
+                        ControlFlow::Continue(None) => {}
+                    }
+                }
                 if walk.advance() {
                     break;
                 }
@@ -362,15 +380,35 @@ impl Grid {
         }
     }
 
-    /// The walk through the grid that a cell is; none where the ray misses it or has been shown all of it.
+    /// The walk through the next grid in a cell that the ray does not miss, as far as the cell goes; none where no grid is left.
     #[inline(never)]
     fn descend<R: Real>(
         &self,
+        walk: &mut Walk,
+        ray: &mut Ray<R>,
+        visit: &mut impl Visitor<R>,
+    ) -> ControlFlow<(), Option<Walk>> {
+        while walk.links > 0 {
+            let inner = self.link(walk.cell, walk.links);
+            walk.links -= 1;
+            let found = self.enter(inner, walk, ray, visit)?;
+            if found.is_some() {
+                return ControlFlow::Continue(found);
+            }
+            walk.line.shorten(ray.t_max);
+        }
+        ControlFlow::Continue(None)
+    }
+
+    /// The walk through one of the grids in a cell; none where the ray misses it or has been shown all of it.
+    #[inline(always)]
+    fn enter<R: Real>(
+        &self,
+        inner: usize,
         walk: &Walk,
         ray: &mut Ray<R>,
         visit: &mut impl Visitor<R>,
     ) -> ControlFlow<(), Option<Walk>> {
-        let inner = self.inner(walk.cell);
         let Some(voxels) = self.grids.get(inner) else { return ControlFlow::Continue(None) };
         let line = walk.line;
         let leaves = walk.exit[walk.first()].min(walk.end).min(line.far);
@@ -398,21 +436,25 @@ impl Grid {
         ray: &mut Ray<R>,
         visit: &mut impl Visitor<R>,
     ) -> ControlFlow<()> {
-        let mut waiting = ArrayVec::<(usize, usize), { MAX_DEPTH + 1 }>::new();
-        let cells = |grid: usize| self.grids.get(grid).map_or((0, 0), |g| (g.first, g.first + g.cells()));
-        waiting.push(cells(grid));
-        while let Some((cell, end)) = waiting.pop() {
-            if cell >= end {
+        // A grid may stand in several cells, and only in grids before it.
+        let mut within = vec![false; self.grids.len()];
+        within[grid] = true;
+        for (g, voxels) in self.grids.iter().enumerate().skip(grid) {
+            if !within[g] {
                 continue;
             }
-            let _ = waiting.try_push((cell + 1, end));
-            visit.node();
-            match self.kinds[cell] {
-                LEAF => visit.leaf(self.leaf(cell), ray)?,
-                GRID => {
-                    let _ = waiting.try_push(cells(self.inner(cell)));
+            for cell in voxels.first..voxels.first + voxels.cells() {
+                visit.node();
+                if !matches!(self.kinds[cell], LEAF | GRID) {
+                    continue;
                 }
-                _ => {}
+                let leaf = self.leaf(cell);
+                if !leaf.prims.is_empty() {
+                    visit.leaf(leaf, ray)?;
+                }
+                if self.kinds[cell] == GRID {
+                    self.inner(cell).for_each(|inner| within[inner] = true);
+                }
             }
         }
         ControlFlow::Continue(())

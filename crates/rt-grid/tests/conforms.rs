@@ -8,8 +8,8 @@ use rt_measure::conform;
 use rt_measure::rays::troublesome;
 use rt_scenes::{SceneGeometry, Solid, Trial};
 
-/// The default; a plain one; grids in grids, and all the way down.
-fn params() -> [GridParams; 4] {
+/// The default; a plain one; grids in grids, and all the way down; grids as objects of grids.
+fn params() -> [GridParams; 5] {
     let plain = GridParams {
         resolution: Resolution::Fixed([7, 2, 64]),
         clip: Clip::Box,
@@ -25,7 +25,13 @@ fn params() -> [GridParams; 4] {
         mailing: Mailing::Inverse,
         ..GridParams::default()
     };
-    [GridParams::default(), plain, GridParams::nested(), deep]
+    let heaps = GridParams {
+        nest: Nest::Sizes { classes: 4, grown: 0.1, least: 2 },
+        mailing: Mailing::None,
+        inner: Resolution::Density(1.0),
+        ..deep
+    };
+    [GridParams::default(), plain, GridParams::nested(), deep, heaps]
 }
 
 /// Where hundreds of primitives coincide a grid tests them again and again, by exact arithmetic: few rays will do.
@@ -48,7 +54,7 @@ fn check<V: Real + Into<R>, R: Real>(trials: &[Trial<V>], turn: usize) {
         let rays = troublesome::<R>(&trial.mesh, if slow { &points[..4] } else { &points });
         let chosen = match turn {
             ALL => params().to_vec(),
-            _ => vec![params()[(i + turn) % 4]],
+            _ => vec![params()[(i + turn) % 5]],
         };
         if slow {
             few::<V, R>(trial, &rays[..rays.len().min(16)], &chosen[0]);

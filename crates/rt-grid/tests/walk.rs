@@ -183,7 +183,8 @@ impl Bounded for Ends {
 fn grids_do_not_depend_on_the_number_of_threads() {
     let mesh = soup::clusters(12_000, 3);
     let measured = GridParams { resolution: Resolution::Measured { rays: 100 }, ..GridParams::default() };
-    for params in [GridParams::default(), GridParams::nested(), GridParams::two_level(), measured] {
+    let hug = GridParams::hug();
+    for params in [GridParams::default(), GridParams::nested(), GridParams::two_level(), hug, measured] {
         let grids = [1, 2, 3, 8].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| Grid::build(&mesh, &params).unwrap())
@@ -244,6 +245,58 @@ fn grids_nest_no_deeper_than_they_may() {
             assert!(found <= depth as usize, "{found} of {depth}");
             assert!(depth == 0 || found > 0, "nothing is nested");
         }
+    }
+}
+
+/// What hangs together becomes a grid, in the grid of the larger thing around it; a ray that comes through many cells of the one meets
+/// each cell of the other as often as it must.
+#[test]
+fn things_of_like_size_become_grids() {
+    // Two rows of small boxes in one large shell of middling ones; and floors.
+    let mut boxes = Vec::new();
+    let mut cube = |x: f32, y: f32, z: f32, side: f32| {
+        boxes.push(Aabb::new(Vec3A::new(x, y, z), Vec3A::new(x, y, z) + Vec3A::splat(side)));
+    };
+    for i in 0..20 {
+        cube(10.0 + i as f32 * 0.1, 10.0, 10.0, 0.1);
+        cube(15.0 + i as f32 * 0.1, 10.0, 10.0, 0.1);
+    }
+    for i in 0..30 {
+        for (x, y) in [(0.0, i as f32), (29.0, i as f32), (i as f32, 0.0), (i as f32, 29.0)] {
+            cube(x, y, 0.0, 1.0);
+            cube(x, y, 19.0, 1.0);
+        }
+        for z in 0..20 {
+            cube(0.0, i as f32, z as f32, 1.0);
+        }
+    }
+    cube(-500.0, -500.0, -1000.0, 1000.0);
+    cube(-500.0, -500.0, 30.0, 1000.0);
+    let hug = GridParams { nest: Nest::Sizes { classes: 3, grown: 0.05, least: 8 }, ..GridParams::hug() };
+    let grid = Grid::build(&Listed(&boxes), &hug).unwrap();
+    grid.validate(&Listed(&boxes)).unwrap();
+    let found = grid.statistics();
+    assert_eq!((found.grids, found.depth), (4, 2), "{found:?}");
+    assert!(grid.repeats());
+    let one = GridParams { depth: 1, ..hug };
+    assert_eq!(Grid::build(&Listed(&boxes), &one).unwrap().statistics().depth, 1);
+    // Of things of one size nothing is made.
+    assert_eq!(Grid::build(&Listed(&boxes[..20]), &hug).unwrap().statistics().grids, 1);
+    for bad in [(0, 0.0, 1), (2, -1.0, 1), (2, f32::NAN, 1), (2, f32::INFINITY, 1), (2, 0.0, 0)] {
+        let nest = Nest::Sizes { classes: bad.0, grown: bad.1, least: bad.2 };
+        assert!(Grid::build(&Listed(&boxes), &GridParams { nest, ..hug }).is_err());
+    }
+}
+
+/// Boxes, and nothing but.
+struct Listed<'a>(&'a [Aabb]);
+
+impl Bounded for Listed<'_> {
+    fn prim_count(&self) -> usize {
+        self.0.len()
+    }
+    fn bound(&self, prim: u32) -> Aabb {
+        self.0.get(prim as usize).copied().unwrap_or(Aabb::EMPTY)
     }
 }
 
