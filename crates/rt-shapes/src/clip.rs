@@ -101,6 +101,10 @@ pub(crate) fn clipped_bound(corners: [DVec3; 3], cell: &Aabb, origin: DVec3) -> 
                 continue;
             }
             let above = |p: DVec3| side * p[a] - plane;
+            // Nothing to cut off.
+            if polygon[..count].iter().all(|p| above(*p) >= 0.0) {
+                continue;
+            }
             let mut kept = [DVec3::ZERO; MOST];
             let mut n = 0;
             for i in 0..count {
