@@ -189,7 +189,8 @@ impl Quadric {
     ///
     /// # Errors
     ///
-    /// When the range is empty, or narrower than rounding, inverted, not finite or more than a turn.
+    /// When the range is empty, or narrower than rounding, inverted, not finite, more than a turn, or an angle is beyond `2^20` either
+    /// way: the rounding of such is no small angle.
     pub fn swept(self, from: f64, to: f64) -> Result<Quadric, QuadricError> {
         Ok(Quadric { angles: [from, to], sweep: Sweep::new([from, to])?, ..self })
     }
@@ -280,7 +281,7 @@ impl Quadric {
         [a.min(b), a.max(b).max(middle)]
     }
 
-    /// The area. Relative error below `2^-45`.
+    /// The area, of a sweep by its angles as given. Relative error below `2^-45`.
     pub fn area(&self) -> f64 {
         (self.angles[1] - self.angles[0]) * self.strip(self.z[1])
     }
