@@ -12,7 +12,7 @@ mod sweep;
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use revolved::Quadric;
-pub(crate) use sweep::share;
+pub(crate) use sweep::{direction, share};
 
 use core::fmt;
 use rt_geom::expansion::two_sum;

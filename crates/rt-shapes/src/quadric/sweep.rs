@@ -74,7 +74,7 @@ fn cross(a: DVec2, b: DVec2) -> i32 {
 }
 
 /// The direction at an angle.
-pub(super) fn direction(phi: f64) -> DVec2 {
+pub(crate) fn direction(phi: f64) -> DVec2 {
     DVec2::new(phi.cos(), phi.sin())
 }
 
