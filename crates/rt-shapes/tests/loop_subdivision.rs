@@ -285,7 +285,7 @@ fn derivatives_are_those_of_differences() {
                 assert!(n.length() == 0.0 || (here.normal - n.normalize()).length() < 1e-9, "{name}");
             }
         }
-        assert!(worst < 1e-6, "{name}: {worst:e}");
+        assert!(worst < 1e-7, "{name}: {worst:e}");
     }
 }
 
