@@ -184,7 +184,7 @@ pub fn load(path: impl AsRef<Path>) -> Result<Scene, NffError> {
 ///
 /// For what is [wrong](NffProblem), or when there is nothing to hit.
 pub fn read(bytes: &[u8], name: &str) -> Result<Scene, NffError> {
-    let mut words = Words::new(bytes);
+    let mut words = Words::new(crate::obj::past_mark(bytes));
     let mut reader = Reader::default();
     let done = reader.read(&mut words);
     let fail = |line, problem| NffError { file: name.to_string(), line, problem };

@@ -160,8 +160,14 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Scene, ObjError> {
     parse(bytes, name, None)
 }
 
+/// Past the mark that some editors begin a file of UTF-8 with.
+pub(crate) fn past_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
 fn parse(bytes: &[u8], name: &str, folder: Option<&Path>) -> Result<Scene, ObjError> {
     let fail = |line, problem| ObjError { file: name.to_string(), line, problem };
+    let bytes = past_mark(bytes);
     if bytes.is_empty() {
         return Err(fail(None, ObjProblem::Empty));
     }
@@ -265,6 +271,18 @@ mod tests {
     }
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+
+    #[test]
+    fn a_byte_order_mark_is_passed_over() {
+        let text = format!("{TRIANGLE}f 1 2 3\n");
+        assert_eq!(mesh(&format!("\u{feff}{text}")), mesh(&text));
+        assert_eq!(fault("\u{feff}"), "x.obj: is empty");
+        // One only, and only where the file begins.
+        for odd in [format!("\u{feff}\u{feff}{text}"), format!("# a\n\u{feff}{text}")] {
+            assert!(fault(odd).contains("this is not text"));
+        }
+        assert_eq!(fault(b"\xff\xfev\x00"), "x.obj:1: this is not text, so not an OBJ file");
+    }
 
     #[test]
     fn faults_are_named() {
@@ -389,7 +407,7 @@ mod tests {
         std::fs::create_dir_all(&folder).unwrap();
         let library = "newmtl red paint\nKd 0.5 0 0\nKs .2 .2 .2\nillum 2\nNs 30\nmap_Kd\nnewmtl glass # 2\n\
                        Kd 0 0 0\nKs 1 1 1\nd 0.1\nNi 1.5\nKd 0.5\nNs\nnewmtl haze\nTr 0.25\nKd 1 1 1\n";
-        std::fs::write(folder.join("two words.mtl"), library).unwrap();
+        std::fs::write(folder.join("two words.mtl"), format!("\u{feff}{library}")).unwrap();
         let text = format!(
             "mtllib two words.mtl\nmtllib gone.mtl\n{TRIANGLE}f 1 2 3\nusemtl red paint\nf 1 2 3\nf 3 2 1\nusemtl glass # 2\n\
              f 1 2 3\nusemtl haze\nf 1 2 3\nusemtl nobody\nf 1 2 3"

@@ -4,6 +4,7 @@ mod area;
 mod orientation;
 
 pub use area::MeshSampler;
+pub(crate) use area::{ends, pick};
 pub use orientation::{Component, Facing, Orientation};
 
 use crate::{Meeting, Partials, Surface, Surfaced, Triangle, Uv};

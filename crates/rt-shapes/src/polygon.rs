@@ -1,12 +1,13 @@
 //! [`Polygon`]: planar polygons.
 
-use crate::mesh::hit;
+use crate::mesh::{ends, hit, pick};
+use crate::triangle::power_of_two;
 use crate::{Partials, Shape, Surface, Triangle, Uv};
 use core::fmt;
 use core::ops::ControlFlow;
 use rt_accel::{Hit, Primitive, WorldBound};
 use rt_bounds::{Aabb, DAabb};
-use rt_geom::glam::DVec3;
+use rt_geom::glam::{DVec2, DVec3};
 use rt_geom::{Axis, Ray, Real, Transform};
 
 /// A planar polygon, convex or concave, in world space, kept in `f64`; answers rays of both precisions.
@@ -31,6 +32,9 @@ pub struct Polygon {
     corners: Box<[DVec3]>,
     triangles: Box<[Triangle]>,
     normal: DVec3,
+    /// For each triangle the area up to its end, in squares of `unit`: so that it stays in range.
+    ends: Box<[f64]>,
+    unit: f64,
 }
 
 /// Why corners are not a polygon.
@@ -65,8 +69,48 @@ impl Polygon {
     /// See [`PolygonError`].
     pub fn new(corners: &[DVec3]) -> Result<Polygon, PolygonError> {
         let (cuts, normal) = cut(corners)?;
-        let triangles = cuts.into_iter().map(|cut| Triangle { corners: cut.map(|i| corners[i]) }).collect();
-        Ok(Polygon { corners: corners.into(), triangles, normal })
+        let triangles: Box<[Triangle]> =
+            cuts.into_iter().map(|cut| Triangle { corners: cut.map(|i| corners[i]) }).collect();
+        let size = corners.iter().fold(0.0f64, |m, &p| m.max((p - corners[0]).abs().max_element()));
+        let unit = power_of_two(size);
+        let areas = triangles.iter().map(|part| Triangle { corners: part.corners.map(|p| p / unit) }.area());
+        let ends: Box<[f64]> = ends(areas).collect();
+        if !ends.last().is_some_and(|&area| area > 0.0 && area.is_finite()) {
+            return Err(PolygonError::NoArea);
+        }
+        Ok(Polygon { corners: corners.into(), triangles, normal, ends, unit })
+    }
+
+    /// The area of its triangles: zero or infinite where it leaves the range of `f64`.
+    ///
+    /// Error: 0.51 units in the last place of each triangle's, and one rounding.
+    pub fn area(&self) -> f64 {
+        self.ends[self.ends.len() - 1] * self.unit * self.unit
+    }
+
+    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`. Numbers
+    /// outside are moved to the nearest inside, NaN to 0. The first picks the triangle, as that of a
+    /// [`MeshSampler`](crate::MeshSampler). Cost: `O(log n)`.
+    ///
+    /// ```
+    /// use rt_geom::glam::{DVec2, DVec3};
+    /// use rt_shapes::Polygon;
+    /// let corners = [(0.0, 0.0), (2.0, -1.0), (0.0, 3.0), (-2.0, -1.0)].map(|(x, y)| DVec3::new(x, y, 1.0));
+    /// let arrow = Polygon::new(&corners)?;
+    /// let spot = arrow.sample(DVec2::new(0.25, 0.5));
+    /// assert_eq!((arrow.area(), spot.point.z, spot.normal), (6.0, 1.0, DVec3::Z));
+    /// # Ok::<(), rt_shapes::PolygonError>(())
+    /// ```
+    pub fn sample(&self, xi: DVec2) -> Surface {
+        let (part, weights) = pick(&self.ends, xi);
+        self.record(part, weights)
+    }
+
+    fn record(&self, part: u32, weights: [f64; 3]) -> Surface {
+        let surface = self.triangles[part as usize].surface(weights);
+        // The part's own normal, on the polygon's side: corners may be off the plane.
+        let side = if surface.normal.dot(self.normal) < 0.0 { -surface.normal } else { surface.normal };
+        Surface { normal: side, shading: side, ..surface }
     }
 
     /// The corners, in the order given.
@@ -189,11 +233,7 @@ impl<R: Real> Primitive<R> for Polygon {
 
 impl<R: Real> Shape<R> for Polygon {
     fn surface(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Surface {
-        let part = &self.triangles[hit.at.prim as usize];
-        let surface = part.surface(part.weights(ray, hit));
-        // The part's own normal, on the polygon's side: corners may be off the plane.
-        let side = if surface.normal.dot(self.normal) < 0.0 { -surface.normal } else { surface.normal };
-        Surface { normal: side, shading: side, ..surface }
+        self.record(hit.at.prim, self.triangles[hit.at.prim as usize].weights(ray, hit))
     }
 
     fn partials(&self, _ray: &Ray<R>, hit: &Hit<Uv, R>) -> Partials {

@@ -12,7 +12,7 @@ mod sweep;
 pub use disk::Disk;
 pub use frustum::Frustum;
 pub use revolved::Quadric;
-pub(crate) use sweep::share;
+pub(crate) use sweep::{direction, share};
 
 use core::fmt;
 use rt_geom::expansion::two_sum;
@@ -47,7 +47,8 @@ pub enum QuadricError {
         /// The upper end, as given.
         max: f64,
     },
-    /// A range of angles that is empty or narrower than rounding, inverted, not finite, or more than a full turn.
+    /// A range of angles that is empty or narrower than rounding, inverted, not finite, beyond `2^20` radians either way, or more than
+    /// a full turn.
     Sweep {
         /// The first angle, in radians.
         from: f64,
@@ -78,7 +79,10 @@ impl fmt::Display for QuadricError {
                 write!(f, "heights from {min} to {max} are no part of the surface with an extent")
             }
             QuadricError::Sweep { from, to } => {
-                write!(f, "angles from {from} to {to} are no range of up to a full turn")
+                write!(
+                    f,
+                    "angles from {from} to {to} are no range of up to a full turn, within 2^20 either way"
+                )
             }
             QuadricError::Inner { inner, outer } => {
                 write!(f, "inner radius {inner} is not at least 0 and below the outer radius {outer}")

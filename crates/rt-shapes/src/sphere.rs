@@ -1,7 +1,8 @@
 //! [`Sphere`]: full spheres.
 
 use crate::clip::sphere_avoids;
-use crate::quadric::share;
+use crate::quadric::{direction, share};
+use crate::surface::unit;
 use crate::{Partials, Shape, Surface, Uv};
 use core::f64::consts::{PI, TAU};
 use core::fmt;
@@ -94,6 +95,43 @@ impl Sphere {
     /// The radius.
     pub fn radius(&self) -> f64 {
         self.radius
+    }
+
+    /// The area: infinite for a radius whose square leaves the range of `f64`. Relative error below `2^-51` but for subnormal ones.
+    pub fn area(&self) -> f64 {
+        4.0 * PI * self.radius * self.radius
+    }
+
+    /// A point of the surface for two numbers from 0 to 1: uniform by area if they are uniform, at density `1 / area`, as
+    /// [`Quadric::sample`](crate::Quadric::sample): the first goes around, the second evenly by height, which area is even by.
+    /// Numbers outside are moved to the nearest inside, NaN to 0.
+    ///
+    /// Source: Archimedes, *On the Sphere and Cylinder* (about 225 BC).
+    ///
+    /// ```
+    /// use rt_geom::glam::{DVec2, DVec3};
+    /// use rt_shapes::Sphere;
+    /// let ball = Sphere::new(DVec3::ONE, 2.0)?;
+    /// assert_eq!(ball.sample(DVec2::new(0.0, 0.5)).point, DVec3::new(3.0, 1.0, 1.0));
+    /// assert_eq!(ball.area(), 16.0 * std::f64::consts::PI);
+    /// # Ok::<(), rt_shapes::SphereError>(())
+    /// ```
+    pub fn sample(&self, xi: DVec2) -> Surface {
+        let xi = unit(xi);
+        // The height in radii is 2 xi.y - 1; so nothing cancels in the distance from the axis.
+        let across = 2.0 * (xi.y * (1.0 - xi.y)).sqrt();
+        self.record((direction(xi.x * TAU) * across).extend(2.0 * xi.y - 1.0))
+    }
+
+    /// The record of the point with a normal.
+    fn record(&self, normal: DVec3) -> Surface {
+        let offset = normal * self.radius;
+        let point = self.center + offset;
+        let error = (offset.abs() * 2.0 + point.abs()) * gamma(5);
+        // Neither cancels near the poles, as an arc cosine would.
+        let around = share([0.0, TAU], normal.truncate());
+        let uv = DVec2::new(around, normal.truncate().length().atan2(-normal.z) / PI);
+        Surface { point, error, normal, shading: normal, uv }
     }
 
     /// Both distances at which the line meets the sphere, the lesser first; equal for a tangent.
@@ -270,14 +308,7 @@ impl<R: Real> Shape<R> for Sphere {
         let wide = ray.widen();
         let rough = wide.at(hit.t.into()) - self.center;
         // Of size 1 first, so that squares neither vanish nor overflow.
-        let normal = (rough / rough.abs().max_element()).normalize_or(DVec3::Z);
-        let offset = normal * self.radius;
-        let point = self.center + offset;
-        let error = (offset.abs() * 2.0 + point.abs()) * gamma(5);
-        // Neither cancels near the poles, as an arc cosine would.
-        let around = share([0.0, TAU], normal.truncate());
-        let uv = DVec2::new(around, normal.truncate().length().atan2(-normal.z) / PI);
-        Surface { point, error, normal, shading: normal, uv }
+        self.record((rough / rough.abs().max_element()).normalize_or(DVec3::Z))
     }
 
     fn partials(&self, ray: &Ray<R>, hit: &Hit<Uv, R>) -> Partials {

@@ -123,6 +123,10 @@ fn faults_are_named() {
         assert_eq!(fault(text), says, "{text}");
     }
     assert_eq!(read(b"s 0 0 0 1\n\xff\xfe", "x").unwrap_err().problem, NffProblem::NotText);
+    // But for the mark that a file of UTF-8 may begin with.
+    assert_eq!(read(b"\xef\xbb\xbfs 0 0 0 1\n", "x").unwrap().prim_count(), 1);
+    let inner = read(b"s 0 0 0 1\n\xef\xbb\xbfs 0 0 0 1\n", "x").unwrap_err();
+    assert!(matches!(inner.problem, NffProblem::Unknown(_)) && inner.line == Some(2), "{inner}");
     let folder = std::env::temp_dir();
     assert_eq!(load(&folder).unwrap_err().problem, NffProblem::Directory);
     let missing = load(folder.join("there is no such file.nff")).unwrap_err();

@@ -36,7 +36,7 @@ pub(super) fn load(
 
 /// Adds to `text` the lines of a library that matter here and are right: `tobj` panics on a colour of two numbers.
 fn clean(bytes: &[u8], file: &str, text: &mut String, warnings: &mut Vec<String>) {
-    let lossy = String::from_utf8_lossy(bytes);
+    let lossy = String::from_utf8_lossy(super::past_mark(bytes));
     let mut bad = None;
     for (number, line) in lossy.lines().enumerate() {
         let mut words = line.split_whitespace();

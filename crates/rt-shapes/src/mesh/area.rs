@@ -130,12 +130,7 @@ impl<V: Real> TriangleMesh<V> {
     /// What is needed to pick points evenly by area: 8 bytes a triangle. `None` for a mesh without area, or one whose area
     /// leaves the range of `f64`.
     pub fn sampler(&self) -> Option<MeshSampler<'_, V>> {
-        let mut sum = DoubleDouble::from(0.0);
-        let mut add = |area: f64| {
-            sum = sum + area.into();
-            sum.value()
-        };
-        let ends: Vec<f64> = self.areas().map(&mut add).collect();
+        let ends: Vec<f64> = ends(self.areas()).collect();
         let area = ends.last().copied()?;
         (area > 0.0 && area.is_finite()).then_some(MeshSampler { mesh: self, ends, area })
     }
@@ -170,14 +165,29 @@ impl<V: Real> MeshSampler<'_, V> {
 
     /// The triangle and the weights of its corners.
     fn place(&self, xi: DVec2) -> (u32, [f64; 3]) {
-        let DVec2 { x: pick, y } = unit(xi);
-        let reach = (pick * self.area).min(self.area.next_down());
-        let prim = self.ends.partition_point(|&end| end <= reach);
-        let start = if prim == 0 { 0.0 } else { self.ends[prim - 1] };
-        let x = (reach - start) / (self.ends[prim] - start);
-        let (u, v) = if y > x { (x * 0.5, y - x * 0.5) } else { (x - y * 0.5, y * 0.5) };
-        (prim as u32, [(1.0 - u) - v, u, v])
+        pick(&self.ends, xi)
     }
+}
+
+/// The areas of triangles, summed up to the end of each.
+pub(crate) fn ends(areas: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+    areas.scan(DoubleDouble::from(0.0), |sum, area| {
+        *sum = *sum + area.into();
+        Some(sum.value())
+    })
+}
+
+/// The triangle that two numbers pick by area, and the weights of its corners there. For each triangle the area up to its end; the
+/// last is positive and finite.
+pub(crate) fn pick(ends: &[f64], xi: DVec2) -> (u32, [f64; 3]) {
+    let DVec2 { x: share, y } = unit(xi);
+    let area = ends[ends.len() - 1];
+    let reach = (share * area).min(area.next_down());
+    let prim = ends.partition_point(|&end| end <= reach);
+    let start = if prim == 0 { 0.0 } else { ends[prim - 1] };
+    let x = (reach - start) / (ends[prim] - start);
+    let (u, v) = if y > x { (x * 0.5, y - x * 0.5) } else { (x - y * 0.5, y * 0.5) };
+    (prim as u32, [(1.0 - u) - v, u, v])
 }
 
 #[cfg(test)]

@@ -77,12 +77,13 @@ impl Disk {
     ///
     /// # Errors
     ///
-    /// When the range is empty, or narrower than rounding, inverted, not finite or more than a turn.
+    /// When the range is empty, or narrower than rounding, inverted, not finite, more than a turn, or an angle is beyond `2^20` either
+    /// way: the rounding of such is no small angle.
     pub fn swept(self, from: f64, to: f64) -> Result<Disk, QuadricError> {
         Ok(Disk { angles: [from, to], sweep: Sweep::new([from, to])?, ..self })
     }
 
-    /// The area.
+    /// The area, of a sweep by its angles as given.
     pub fn area(&self) -> f64 {
         0.5 * (self.angles[1] - self.angles[0]) * (self.outer - self.inner) * (self.outer + self.inner)
     }

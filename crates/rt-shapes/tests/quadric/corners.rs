@@ -26,11 +26,40 @@ fn what_is_no_quadric_says_why() {
     assert!(ball.clone().cut(1.0, 2.0).is_err() && ball.clone().cut(nan, 1.0).is_err());
     assert_eq!(ball.clone().cut(-9.0, 9.0).unwrap(), ball);
     assert!(Quadric::sphere(2e290).is_err() && Frustum::cone(o, 2e290, z).is_err());
-    for (from, to) in [(1.0, 1.0), (1.0, 0.0), (0.0, 7.0), (nan, 1.0), (0.0, nan), (f64::NEG_INFINITY, 0.0)] {
+    let inf = f64::INFINITY;
+    for (from, to) in [
+        (1.0, 1.0),
+        (1.0, 0.0),
+        (0.0, 7.0),
+        (nan, 1.0),
+        (0.0, nan),
+        (nan, nan),
+        (0.0, inf),
+        (-inf, 0.0),
+        (-inf, inf),
+        (inf, inf),
+        (1e15, 1e15 + 1.0),
+        (1e17, 1e17 + 64.0),
+        (-1e17, 16.0 - 1e17),
+        (f64::MIN, f64::MAX),
+        (2f64.powi(20), 2f64.powi(20) + 1.0),
+        ((-2f64.powi(20)).next_down(), 1.0 - 2f64.powi(20)),
+    ] {
         assert!(matches!(ball.clone().swept(from, to), Err(QuadricError::Sweep { .. })), "{from} {to}");
         assert!(Disk::new(0.0, 1.0).unwrap().swept(from, to).is_err());
     }
     assert!(ball.clone().swept(-PI, PI).is_ok() && ball.swept(0.3, 0.3 + TAU).is_ok());
+    // The largest angles still make the part that is meant.
+    for from in [2f64.powi(20) - 1.0, -2f64.powi(20)] {
+        let disk = Disk::new(0.0, 1.0).unwrap().swept(from, from + 1.0).unwrap();
+        assert_eq!(disk.area(), 0.5);
+        let meets = |phi: f64| {
+            let (sin, cos) = phi.sin_cos();
+            disk.intersect_p(&Ray::new(DVec3::new(0.5 * cos, 0.5 * sin, -1.0), DVec3::Z))
+        };
+        assert!(meets(from) && meets(from + 0.5) && meets(from + 1.0));
+        assert!(!meets(from - 1e-8) && !meets(from + 1.0 + 1e-8) && !meets(from + 4.0));
+    }
     assert_eq!(Disk::ring(0.0, 1.0, 1.0), Err(QuadricError::Inner { inner: 1.0, outer: 1.0 }));
     assert!(Disk::new(nan, 1.0).is_err() && Disk::new(0.0, f64::INFINITY).is_err());
     assert_eq!(Frustum::cylinder(o, o, 1.0), Err(QuadricError::NoAxis(o)));
