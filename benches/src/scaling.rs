@@ -108,11 +108,11 @@ fn fits(family: &str, groups: &[Group]) -> Option<Group> {
         let (build, _) = fit(name, |m| m.build_ms.unwrap_or(0.0));
         let (bytes, _) = fit(name, |m| m.bytes_per_prim.unwrap_or(0.0));
         let figures = vec![
-            ("time ~ N^", time),
+            ("time_power", time),
             ("R2", r2),
-            ("work ~ N^", work),
-            ("build ~ N^", build),
-            ("bytes/prim ~ N^", bytes),
+            ("work_power", work),
+            ("build_power", build),
+            ("bytes_power", bytes),
         ];
         // The largest scene's time, for the column.
         let last = all.iter().rev().find_map(|(_, m)| m.iter().find(|m| m.structure == *name));

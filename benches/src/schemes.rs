@@ -185,7 +185,7 @@ pub(crate) fn raced<'a>(
             figures.push(("steps_%", off(by_ray(counts.nodes), known.steps)));
             figures.push(("empty_%", off(empty, known.empty_steps)));
             let cells: u32 = known.cells.iter().product();
-            figures.push(("empty cells_%", off(cells as f64 - leaves as f64, known.empty)));
+            figures.push(("empty_cells_%", off(cells as f64 - leaves as f64, known.empty)));
         }
         if let Some([tests, steps]) = side_of(params).and_then(|n| subdivision::known(scene, n)) {
             figures.push(("tests_%", 100.0 * (by_ray(counts.prims) / tests - 1.0)));
@@ -220,12 +220,12 @@ fn side_of(params: &str) -> Option<u32> {
 fn to_the_best(measured: &mut [Measured]) {
     type Figure = fn(&Measured) -> Option<f64>;
     let columns: [(&str, Figure); 6] = [
-        ("build x", |m| m.build_ms),
-        ("trace x", |m| Some(m.ns_per_ray)),
-        ("tests x", |m| m.tests_per_ray),
-        ("steps x", |m| m.nodes_per_ray),
-        ("refs x", |m| m.figures.iter().find(|(name, _)| *name == "refs").map(|(_, x)| *x)),
-        ("bytes x", |m| m.bytes_per_prim),
+        ("build_x", |m| m.build_ms),
+        ("trace_x", |m| Some(m.ns_per_ray)),
+        ("tests_x", |m| m.tests_per_ray),
+        ("steps_x", |m| m.nodes_per_ray),
+        ("refs_x", |m| m.figures.iter().find(|(name, _)| *name == "refs").map(|(_, x)| *x)),
+        ("bytes_x", |m| m.bytes_per_prim),
     ];
     for (name, figure) in columns {
         let least = measured.iter().filter_map(figure).fold(f64::INFINITY, f64::min);
