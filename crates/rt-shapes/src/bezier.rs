@@ -289,6 +289,8 @@ const GAUSS: [(f64, f64); 8] = [
 
 /// Roots in the ray's interval, nearest first, those that cannot be told apart as one.
 fn apart(mut roots: Vec<PatchRoot>, ray: &Ray<f64>) -> Vec<PatchRoot> {
+    // First, lest one outside stands for one inside.
+    roots.retain(|root| ray.contains(root.t));
     roots.sort_by(|a, b| (a.t - a.error).total_cmp(&(b.t - b.error)));
     // Of those that cannot be told apart, the surest stands for all, with the stretch of all for its error.
     let mut apart: Vec<(PatchRoot, f64, f64)> = Vec::with_capacity(roots.len());
@@ -308,7 +310,7 @@ fn apart(mut roots: Vec<PatchRoot>, ray: &Ray<f64>) -> Vec<PatchRoot> {
         error: (root.t - start).max(end - root.t),
         ..root
     };
-    apart.into_iter().map(stretch).filter(|root| ray.contains(root.t)).collect()
+    apart.into_iter().map(stretch).collect()
 }
 
 /// A box with room for what rounding makes of rays that are aimed at its faces from some tens of times its size.
