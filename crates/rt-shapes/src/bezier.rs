@@ -28,8 +28,12 @@ use search::{Frame, Next, Search};
 ///
 /// Rounding means some `2^-50` of the larger of the patch's coordinates and the distance of the ray's origin: within that of the
 /// outline or of an open border a hit may be made up; never beyond `2^-45` of its size from the box of the patch, so that every
-/// structure finds the same hits. Meetings that lie within each other's [error](PatchRoot::error) are one
-/// to [`Primitive::all_hits`]. A ray that runs along the patch for a stretch meets it at the near end.
+/// structure finds the same hits. A ray that runs along the patch for a stretch meets it at the near end.
+///
+/// Close pairs are one: two meetings between which the patch leaves the ray by less than some `2^-44` of that size (the
+/// deepest of ten thousand tried), or that lie within each other's [error](PatchRoot::error), are reported as one root whose error
+/// covers both; to [`Primitive::all_hits`] they are one hit. Along a ray that grazes, such a pair is apart by the square root of
+/// its depth: by a millionth of the size, not by rounding. The error says so.
 ///
 /// Edges may be points (the lid of the teapot), control points may coincide, surfaces may fold and cross themselves. Cost: some
 /// tens of pieces for a ray that hits, one or two for most that miss; never more than 16384, then what is left is met
@@ -49,7 +53,7 @@ use search::{Frame, Next, Search};
 /// # Ok::<(), rt_shapes::PatchError>(())
 /// ```
 ///
-/// Error: `t` is off by [`PatchRoot::error`] at most: some `2^-50` of the distance where the ray is steep.
+/// Error: `t` is off by [`PatchRoot::error`] at most: some `2^-50` of the distance where the ray is steep, up to `2^-44` at a border.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BezierPatch {
     control: [DVec3; 16],
