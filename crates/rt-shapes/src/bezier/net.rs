@@ -140,9 +140,20 @@ impl Piece {
         }
         let (u, v) = (widened(u, first.1 + 16.0 * U), widened(v, second.1 + 16.0 * U));
         let inside = u.lo > 0.0 && u.hi < 1.0 && v.lo > 0.0 && v.hi < 1.0;
-        let one = inside && contracts(&first.0, Along::U) && contracts(&second.0, Along::V);
+        let one = inside && slope(&first, Along::U) < 0.9 && slope(&second, Along::V) < 0.9;
         let clip = |s: Span| Span { lo: s.lo.max(0.0), hi: s.hi.min(1.0) };
         Some(Rest { u: clip(u), v: clip(v), one })
+    }
+
+    /// Whether the piece, with half its length on all sides, holds one root at most: there, values of polynomials of degrees two
+    /// and three are `2^2 2^3` times their control values at most, and `p - Y f(p)` contracts if its derivatives are so much
+    /// smaller. False where they are as small as rounding.
+    pub(super) fn holds_one(&self, spans: &Spans) -> bool {
+        let ([xu, xv], [yu, yv]) = (slopes(&self.x), slopes(&self.y));
+        let r = 1.0 / (xu * yv - xv * yu);
+        let first = self.fixed([yv * r, -xv * r], spans);
+        let second = self.fixed([-yu * r, xu * r], spans);
+        32.0 * slope(&first, Along::U) < 0.9 && 32.0 * slope(&second, Along::V) < 0.9
     }
 
     /// Whether the piece, which is almost a line as the ray sees it, lies beside the ray: to one side of a line along it.
@@ -241,9 +252,9 @@ fn slopes(p: &Grid) -> [f64; 2] {
     [slope(rows), slope(columns)]
 }
 
-/// Whether `p - grid` has derivatives so small, that of `along` apart from 1, that it contracts.
+/// What the derivatives of `p - grid`, that of `along` apart from 1, sum up to at most: below 1, it contracts in that row.
 #[inline]
-fn contracts(grid: &Grid, along: Along) -> bool {
+fn slope((grid, error): &(Grid, f64), along: Along) -> f64 {
     let [one_u, one_v] = if along == Along::U { [1.0, 0.0] } else { [0.0, 1.0] };
     let (mut du, mut dv) = (0.0f64, 0.0f64);
     for i in 0..3 {
@@ -252,8 +263,8 @@ fn contracts(grid: &Grid, along: Along) -> bool {
             dv = dv.max((one_v - 3.0 * (grid[4 * j + i + 1] - grid[4 * j + i])).abs());
         }
     }
-    // Room for what the grid is off by.
-    du + dv < 0.9
+    // Three times a difference of two that are off, in both directions.
+    du + dv + 12.0 * error
 }
 
 /// The four indices of a line of control values.

@@ -28,7 +28,7 @@ pub struct PatchRoot {
     /// The distance, in lengths of the ray's direction.
     pub t: f64,
     /// What `t` may be off by. Where the ray grazes the patch or runs along it, the stretch of the ray that cannot be told
-    /// from the patch.
+    /// from the patch: every meeting on it is within `error` of `t`.
     pub error: f64,
     /// The first parameter, in `[0, 1]`.
     pub u: f64,
@@ -283,11 +283,18 @@ impl<'a, F: FnMut(PatchRoot) -> Next> Search<'a, F> {
     fn accept(&mut self, piece: &Piece, spans: &Spans) -> ControlFlow<()> {
         if self.left == 0 {
             self.counts.unresolved += 1;
-        } else if let Some(root) = self.newton(piece.u, piece.v) {
-            // A root at the border of the patch, or of pieces.
-            return self.found(root);
+        } else if let Some((z, root)) = self.newton(piece.u, piece.v) {
+            // A root at the border of the patch, or of pieces. Where it may not be the only one, it stands for all of the piece.
+            let near = (root.u - piece.u.middle()).abs() <= piece.u.len()
+                && (root.v - piece.v.middle()).abs() <= piece.v.len();
+            if near && piece.holds_one(spans) {
+                return self.found((z, root));
+            }
+            let reach = (spans.z.hi - z).max(z - spans.z.lo) + 2.0 * piece.slack_z;
+            let error = root.error.max(self.frame.t(reach).abs());
+            return self.found((z, PatchRoot { error, ..root }));
         }
-        let stretch = spans.z.len() + piece.slack_z;
+        let stretch = spans.z.len() + 2.0 * piece.slack_z;
         let point = 16.0 * piece.slack;
         if spans.x.len() <= point && spans.y.len() <= point {
             // All of it lies on the ray: the near end.
