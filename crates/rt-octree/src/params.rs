@@ -41,7 +41,7 @@ pub enum Storage {
     Nodes,
     /// As the sorted Morton codes of the leaves that are not empty, 8 bytes each, and no nodes: rays compute the planes
     /// anew and search for the children. For [`Split::Centre`] only, since planes are not kept. Measured on spheres,
-    /// cones and triangles it took 0.8 to 1.03 of the bytes of such nodes, references included, and 1.1 to 4 times the
+    /// cones and triangles it took 0.7 to 1.03 of the bytes of such nodes, references included, and 1.4 to 4 times the
     /// time: its merit is that leaves are one sorted list, to be merged, sent and searched.
     ///
     /// Source: Gargantini, "Linear octtrees for fast processing of three-dimensional objects", Computer Graphics and
@@ -61,14 +61,15 @@ pub struct OctreeParams {
     pub split: Split,
     /// Which cells become leaves.
     pub stop: Stop,
-    /// Most splits on a way, in `0..=21`; `None` for `4 + 0.6 log2 n`.
+    /// Most splits on a way, in `0..=21`; `None` for `2 + 0.45 log2 n` by [`Split::Cost`], beyond which a mesh of 70 000
+    /// triangles took 1.9 times the memory and gained nothing, and `4 + 0.6 log2 n` by [`Split::Centre`].
     pub max_depth: Option<u32>,
     /// Cells with up to this many references are not split; at least 1.
     pub max_prims: u32,
     /// Most references, as a multiple of the number of primitives, at least 1: a cell may be split into as many as fall
     /// to its share. It is what bounds the memory for primitives that no plane parts, such as one a thousand times.
     /// Long thin ones want much: sticks of aspect 100 had 49 references each at 128, and rays twice as fast as at 32;
-    /// scenes of surfaces have 2 to 10 at any.
+    /// meshes and the scenes of the SPD have 2 to 14.
     pub most_references: f32,
     /// What visiting a node or a leaf and testing a primitive cost.
     pub sah: Sah,
@@ -142,7 +143,11 @@ impl OctreeParams {
     }
 
     pub(crate) fn depth(&self, prims: usize) -> u32 {
-        let usual = 4.0 + 0.6 * (prims.max(1) as f64).log2();
+        let bits = (prims.max(1) as f64).log2();
+        let usual = match self.split {
+            Split::Cost => 2.0 + 0.45 * bits,
+            Split::Centre => 4.0 + 0.6 * bits,
+        };
         self.max_depth.unwrap_or((usual.round() as u32).min(MAX_DEPTH as u32))
     }
 }
