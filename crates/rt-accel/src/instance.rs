@@ -87,12 +87,17 @@ impl<P> Instance<P> {
     /// The ray inside and where it may hit, if it meets the world bound.
     #[inline(always)]
     fn enter<R: Real>(&self, ray: &Ray<R>) -> Option<(Ray<f64>, Held)> {
-        let reach = ray.t_max.reach();
-        let [near, far] = self.bound.span(&Ray { t_max: reach, ..ray.widen() })?;
+        let (start, reach) = (ray.t_min.into(), ray.t_max.reach());
+        // Of the whole line, so that a ray that ends at a hit held in the box does not end before the box.
+        let line = Ray { t_min: f64::NEG_INFINITY, t_max: f64::INFINITY, ..ray.widen() };
+        let [near, far] = self.bound.span(&line)?;
+        if !(start <= reach && start <= far && near <= reach) {
+            return None;
+        }
         let mut inside = self.to_object.ray(ray);
         // A ray that ends behind the box ends nowhere: what is hit then does not depend on where exactly it ends.
         inside.t_max = if far <= reach { f64::INFINITY } else { reach };
-        Some((inside, Held { near, far, t_min: ray.t_min.into() }))
+        Some((inside, Held { near, far, t_min: start }))
     }
 }
 
