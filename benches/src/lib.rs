@@ -163,9 +163,9 @@ impl Question {
             (Question::Any, Effort::Quick) => 14,
             (Question::Build, Effort::Quick) => 120,
             (Question::Precision, Effort::Quick) => 12,
-            (Question::Structures, Effort::Quick) => 60,
-            (Question::Subdivision, Effort::Quick) => 30,
-            (Question::Scaling, Effort::Quick) => 30,
+            (Question::Structures, Effort::Quick) => 150,
+            (Question::Subdivision, Effort::Quick) => 90,
+            (Question::Scaling, Effort::Quick) => 150,
             (Question::Slab, _) => 2,
             (Question::Volumes, Effort::Quick) => 30,
             (Question::Shapes, Effort::Quick) => 15,
@@ -207,7 +207,7 @@ impl fmt::Display for Question {
 /// How much time an answer may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// All questions but that about rivals in less than two minutes.
+    /// All questions but that about rivals in some ten minutes.
     Quick,
     /// Some minutes.
     Normal,

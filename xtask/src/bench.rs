@@ -22,7 +22,7 @@ pub(crate) struct Args {
     /// What to ask. Without any, all but rivals.
     #[arg(value_enum, value_name = "QUESTION")]
     questions: Vec<Asked>,
-    /// Less than two minutes for all questions, on few rays.
+    /// Some ten minutes for all questions, on few rays.
     #[arg(long, conflicts_with = "full")]
     quick: bool,
     /// Scenes of a million primitives, too.
@@ -50,7 +50,7 @@ pub(crate) struct Args {
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask bench --quick                       all questions in less than two minutes
+  cargo xtask bench --quick                       all questions in some ten minutes
   cargo xtask bench closest any                   two questions, in some minutes
   cargo xtask bench build --scene soup-1000000    what the knobs of a build do to one scene
   cargo xtask bench --scene bunny.obj --no-record a mesh of one's own

@@ -34,7 +34,7 @@ Examples:
   cargo xtask render                    a picture of balls in out/balls.png
   cargo xtask render tetra --explain    another scene, and what it leaves out
   cargo xtask stability --rays 10000000 stiff and extreme cases against exact arithmetic
-  cargo xtask bench --quick             what rays cost, in less than two minutes
+  cargo xtask bench --quick             what rays cost, in some ten minutes
   cargo xtask spd                       do Haines' scenes take the rays they are known for?
   cargo xtask golden                    has any reference picture changed?
   cargo xtask ci                        everything a server checks
